@@ -33,7 +33,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import Sensor, System
 from syncline_design.model.timing import TimingError, Uniform
-from syncline_design.simulation.distribution import Values
+from syncline_design.simulation.distribution import ErrorValues
 from syncline_design.simulation.intervals import proportion_interval
 from syncline_design.simulation.run import error_distribution, quantile_estimates
 from syncline_design.simulation.sampling import sample_errors
@@ -200,7 +200,7 @@ def coverage(count: int, samples: int, seed: int) -> None:
     system = lidar(position=(0.02, 0.02, 0.04), attitude=(0.001, 0.001, 0.003),
                    ranging=(0.03, 0.001, 0.001), t_position=stamp, t_attitude=stamp)  # fmt: skip
     many = sample_errors(system, SimulationSettings(samples=4_000_000, seed=10**6))
-    whole = Values(np.linalg.norm(many, axis=1))
+    whole = ErrorValues(np.linalg.norm(many, axis=1))
     ranks = [math.ceil(p * whole.count) for p in QUANTILES]
     truth = dict(zip(QUANTILES, whole.order_statistics(ranks), strict=True))
     found = covered(system, truth, count, samples, seed)

@@ -28,7 +28,7 @@ from syncline_design.model.system import System
 from syncline_design.planning.run import plan
 from syncline_design.planning.setup import PlanRequest
 from syncline_design.planning.telling import PlanRun
-from syncline_design.planning.wanted import Asked, Pair, PlanError, named
+from syncline_design.planning.wanted import EffectPair, PlanError, PlanWanted, named
 from syncline_design.spec.load import load
 from tests.world.hidden import Hidden, hidden
 from tests.world.motions import Sensors
@@ -135,7 +135,9 @@ def one_plan(number: int, folder: Path, only: str) -> dict[str, object] | None:
     case = load(spec)
     first, second = (named(n, "") for n in names)
     asked = (
-        Asked((), (Pair(first, second),)) if separate else Asked(((first, None), (second, None)))
+        PlanWanted((), (EffectPair(first, second),))
+        if separate
+        else PlanWanted(((first, None), (second, None)))
     )
     begun = time.process_time()
     try:

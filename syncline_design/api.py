@@ -237,11 +237,11 @@ def plan(
 
     seed = _seed(seed)
     least = arguments.amount("minutes", minutes, 0.0)
-    pairs: tuple[wanted.Pair, ...] = ()
+    pairs: tuple[wanted.EffectPair, ...] = ()
     if separate is not None:
         first, second = (wanted.named(one, "separate") for one in separate)
-        pairs = (wanted.Pair(first, second),)
-    asked = wanted.Asked(() if reach is None else wanted.reach_of(reach), pairs)
+        pairs = (wanted.EffectPair(first, second),)
+    asked = wanted.PlanWanted(() if reach is None else wanted.reach_of(reach), pairs)
     files = tuple(_files(flown))
     with _limited(time_limit_s):
         case = as_measured(_case(spec), seed)

@@ -22,6 +22,7 @@ from syncline_design.diagnosis.plotted import (
     Residuals,
 )
 from syncline_design.diagnosis.result import (
+    DiagnosisProvenance,
     Estimate,
     Finding,
     Fit,
@@ -29,9 +30,8 @@ from syncline_design.diagnosis.result import (
     HeldOut,
     Likelihoods,
     LogRead,
-    Motion,
+    MotionQuantiles,
     Noise,
-    Provenance,
     Regime,
     Remaining,
     Rival,
@@ -120,7 +120,7 @@ def diagnosis(**changed: Any) -> DiagnosisAndDesign:
             duration_s=300.0,
             interval_s=0.1,
             fitted=2987,
-            motion={"speed": Motion(0.8, 7.8, "m/s")},
+            motion={"speed": MotionQuantiles(0.8, 7.8, "m/s")},
         ),
         "noise": Noise({"car/position": 0.9}, {}, 800, Likelihoods(-3252.1, -19209.6)),
         "plots": Plots(
@@ -130,7 +130,7 @@ def diagnosis(**changed: Any) -> DiagnosisAndDesign:
         ),
         "spec": SpecRead("Car", "car.yaml"),
         "log_files": ("car.csv",),
-        "provenance": Provenance("0.1.0", 0, 0.05, 4, (), "ab", "cd"),
+        "provenance": DiagnosisProvenance("0.1.0", 0, 0.05, 4, (), "ab", "cd"),
         "design": DESIGN,
     }
     return DiagnosisAndDesign(**parts | changed)

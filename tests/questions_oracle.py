@@ -23,7 +23,7 @@ from syncline_design.choice.stampings import stampings_of
 from syncline_design.spec.load import Case, load_text
 from syncline_design.verdict.admitted import kinds_of, with_whole_catalog
 from syncline_design.verdict.alternatives import alternatives, bargains
-from syncline_design.verdict.why_not import Answer, Asked, NotTaken, why_not
+from syncline_design.verdict.why_not import Answer, AskedSpec, NotTaken, why_not
 from test_random_specs import draw_spec
 
 Key = tuple[int, float]  # cents, error [m]
@@ -70,7 +70,7 @@ def held(plain: Enumeration, one: Outcome, kind: str) -> set[str]:
 def answers_of(spec: dict[str, Any], *entries: str) -> list[Answer]:
     case = case_of(spec)
     problem, whole = build_problem(case), with_whole_catalog(case)
-    asked = Asked(case, problem, best_design(problem), build_problem, whole)
+    asked = AskedSpec(case, problem, best_design(problem), build_problem, whole)
     return list(why_not(asked, kinds_of(whole, entries)))
 
 

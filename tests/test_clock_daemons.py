@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from syncline_design.clocks.reading import read_logs
-from syncline_design.clocks.series import Series
+from syncline_design.clocks.series import ClockSeries
 
 PATHS = os.environ.get("PATH", "") + os.pathsep + "/usr/sbin:/sbin"
 CHRONYD, PTP4L = shutil.which("chronyd", path=PATHS), shutil.which("ptp4l", path=PATHS)
@@ -57,7 +57,7 @@ def _run(script: str, folder: Path, **names: str | None) -> None:
     )  # fmt: skip
 
 
-def _only(paths: list[Path], name: str) -> Series:
+def _only(paths: list[Path], name: str) -> ClockSeries:
     (found,) = [one for one in read_logs(paths).series if one.kind.name.startswith(name)]
     return found
 

@@ -28,7 +28,7 @@ from syncline_design.diagnosis.tails import tails_of
 from syncline_design.diagnosis.trajectory import pieces
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import gauss_markov
-from syncline_design.effects.record import Target
+from syncline_design.effects.record import ActsOn
 from syncline_design.model.figure_text import format_estimate
 
 Array = NDArray[np.float64]
@@ -285,7 +285,7 @@ def test_far_rows_are_tails_or_outliers_and_not_both(freedom: float, rate: float
         assert np.sqrt(fitted) == pytest.approx(np.sqrt(variance), rel=0.15)
 
 
-def late(seconds: float, sensor: Target = "position") -> Acting:
+def late(seconds: float, sensor: ActsOn = "position") -> Acting:
     return acting("latency", sensor, 0, {"latency_s": seconds})
 
 

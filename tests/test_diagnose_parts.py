@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from syncline_design.diagnosis import Diagnosis, diagnose
 from syncline_design.diagnosis.parts import LEAST, MOST, _best
-from syncline_design.diagnosis.spans import Span, span_of
+from syncline_design.diagnosis.spans import StampSpan, span_of
 from syncline_design.effects import registry
 from syncline_design.report.on_diagnosis import sentence_text
 from tests.world import hidden, make_log, scenario
@@ -99,7 +99,7 @@ def test_the_stretch_that_sums_by_block_say_is_the_best_by_plain_least_squares()
 
 def test_a_cut_effect_departs_inside_alone_and_keeps_its_name() -> None:
     effect = registry()["latency"]
-    cut = Span(effect, 2.0, 3.0).cut
+    cut = StampSpan(effect, 2.0, 3.0).cut
     span = span_of(cut)
     assert span is not None
     assert span_of(effect) is None

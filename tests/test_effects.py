@@ -20,11 +20,11 @@ from syncline_design.effects import NOT_EFFECTS, registry
 from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
 from syncline_design.effects.record import (
     SELDOM,
+    ActsOn,
     Basis,
     Departures,
     Effect,
     StageRows,
-    Target,
 )
 from syncline_design.model.system import Platform, Sensor, Stage
 from syncline_design.model.timing import NO_ERROR
@@ -81,7 +81,7 @@ def stage(ranging_type: str = "usbl") -> Stage:
     )
 
 
-def values_of(effect: Effect, sensor: Target, size: float = 0.0) -> dict[str, float]:
+def values_of(effect: Effect, sensor: ActsOn, size: float = 0.0) -> dict[str, float]:
     """Every continuous parameter `size` of its plausible least, located ones in the middle."""
     values: dict[str, float] = {}
     for p in effect.parameters:
@@ -105,7 +105,7 @@ def test_every_file_of_the_folder_is_one_effect_of_its_name() -> None:
 
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
-def test_sensitivity_is_the_slope_of_the_exact_term(effect: Effect, sensor: Target) -> None:
+def test_sensitivity_is_the_slope_of_the_exact_term(effect: Effect, sensor: ActsOn) -> None:
     if effect.sensitivity is None:
         assert effect.kind != "deterministic"
         return
@@ -125,7 +125,7 @@ def test_sensitivity_is_the_slope_of_the_exact_term(effect: Effect, sensor: Targ
 
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
-def test_nothing_departs_at_zero(effect: Effect, sensor: Target) -> None:
+def test_nothing_departs_at_zero(effect: Effect, sensor: ActsOn) -> None:
     if effect.kind == "discrete" or effect.opens in OWN:
         return  # a convention has no zero; a factor's neutral value is 1, tails' is infinity
     state = rows()
@@ -137,7 +137,7 @@ def test_nothing_departs_at_zero(effect: Effect, sensor: Target) -> None:
 
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
-def test_it_says_what_people_need(effect: Effect, sensor: Target) -> None:
+def test_it_says_what_people_need(effect: Effect, sensor: ActsOn) -> None:
     for text in (effect.sentence, effect.confused_with, effect.separated_by, effect.source):
         assert text.strip()
     named = {field for _, field, _, _ in string.Formatter().parse(effect.sentence) if field}
@@ -147,7 +147,7 @@ def test_it_says_what_people_need(effect: Effect, sensor: Target) -> None:
 
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
-def test_it_adds_to_the_budget(effect: Effect, sensor: Target) -> None:
+def test_it_adds_to_the_budget(effect: Effect, sensor: ActsOn) -> None:
     basis = Basis(distance_m=50.0, arm_m=3.0)
     small, large = (
         effect.contribute(
@@ -170,7 +170,7 @@ STOCHASTIC = [(e, s) for e, s in PAIRS if e.kind == "stochastic" and e.opens not
 
 
 @pytest.mark.parametrize(("effect", "sensor"), STOCHASTIC, ids=lambda x: getattr(x, "name", x))
-def test_what_is_drawn_has_the_stated_variance(effect: Effect, sensor: Target) -> None:
+def test_what_is_drawn_has_the_stated_variance(effect: Effect, sensor: ActsOn) -> None:
     """400 draws: every diagonal entry within 5 of its standard errors (2/400)^0.5 = 7 %.
 
     180 entries at 5 sigma: a true covariance fails one run in 10 000 (chi-square's skew included).

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from syncline_design.logs.frame_fit import StillError, Track, laid, mean_turn
+from syncline_design.logs.frame_fit import LaidTrack, StillError, laid, mean_turn
 from tests.flight_logs import flight
 
 MADE = flight(60.0)
@@ -14,13 +14,13 @@ SHIFT = np.array([120.0, -45.0, 7.0])
 
 
 def seen(turn: Rotation, late_s: float = 0.0, lever: tuple[float, ...] = (0, 0, 0),
-         noise_m: float = 0.0) -> tuple[Track, np.ndarray]:  # fmt: skip
+         noise_m: float = 0.0) -> tuple[LaidTrack, np.ndarray]:  # fmt: skip
     """What one system says, and where the other says it is."""
     late = flight(60.0, late_s=late_s, noise_m=noise_m)
     place = late.place + late.turn.apply(np.array(lever, dtype=float))
     back = turn.inv()
     body = (back * MADE.turn).as_matrix()
-    return Track(back.apply(MADE.place), back.apply(MADE.velocity), body), place + SHIFT
+    return LaidTrack(back.apply(MADE.place), back.apply(MADE.velocity), body), place + SHIFT
 
 
 @pytest.mark.parametrize("degrees", [-170.0, 0.0, 3.0, 91.0])
@@ -69,11 +69,11 @@ def test_far_points_count_little() -> None:
 def test_one_frame_is_left_alone_and_stillness_is_told() -> None:
     track, onto = seen(Rotation.identity())
     assert laid(track, onto - SHIFT + 0.5, "heading") is None
-    still = Track(track.place * 1e-3, track.velocity * 0.0, None)
+    still = LaidTrack(track.place * 1e-3, track.velocity * 0.0, None)
     with pytest.raises(StillError, match="extend over"):
         laid(still, still.place + SHIFT, "heading")
     with pytest.raises(StillError, match="only 5 common"):
-        laid(Track(track.place[:5], track.velocity[:5], None), onto[:5], "heading")
+        laid(LaidTrack(track.place[:5], track.velocity[:5], None), onto[:5], "heading")
 
 
 def test_the_mean_of_turns() -> None:

@@ -211,9 +211,9 @@ def test_the_time_limit_passes_through_whatever_unpacks(
 
 @pytest.mark.parametrize("writer", ["ros1", "ros2", "mcap"])
 def test_streams_read_together_are_the_streams_read_alone(tmp_path: Path, writer: str) -> None:
-    from syncline_design.logs.run_parts import Known, pieces_of
+    from syncline_design.logs.run_parts import KnownRecording, pieces_of
 
-    recording = Known(open_recording(WRITERS[writer](tmp_path, MADE)))
+    recording = KnownRecording(open_recording(WRITERS[writer](tmp_path, MADE)))
     joined: dict[str, list[np.ndarray]] = {}
     for name, piece in pieces_of(recording, ["/fix", "/odom"]):
         joined.setdefault(name, []).append(np.stack(list(piece.columns.values())))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from syncline_design.logs.readers import open_recording, reader_of, registry
-from syncline_design.logs.readers.reader import Head, library
+from syncline_design.logs.readers.reader import FileHead, library
 from syncline_design.logs.readers.stream import UNSET, StampColumn
 from syncline_design.spec.load import BadInput
 
@@ -79,7 +79,7 @@ def test_packed_bytes_that_look_like_a_receivers_message_leave_a_bag_a_bag(tmp_p
     """Eight bytes of a chunk make an empty UBX message with a right checksum."""
     chance = b"\n$" + bytes([0xB5, 0x62, 0, 0, 0, 0, 0, 0])
     for magic, kind in ((b"\x89MCAP0\r\n", "MCAP"), (b"#ROSBAG V2.0\n", "ROS 1 bag")):
-        head = Head(tmp_path / "x", magic + bytes(range(256)) * 8 + chance * 3, 2100)
+        head = FileHead(tmp_path / "x", magic + bytes(range(256)) * 8 + chance * 3, 2100)
         reader = reader_of(head)
         assert reader is not None
         assert kind in reader.format

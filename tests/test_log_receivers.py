@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from syncline_design.logs.readers import open_recording
-from syncline_design.logs.readers.receiver_frames import Sums
+from syncline_design.logs.readers.receiver_frames import FletcherSums
 from syncline_design.logs.readers.stream import UNSET, Recording, Stream
 from syncline_design.spec.load import BadInput
 
@@ -294,7 +294,7 @@ def test_comments_of_an_archive_and_rtcm_are_passed_over(tmp_path: Path) -> None
 
 def test_the_sum_of_a_message_is_that_of_the_library() -> None:
     block = bytes(np.random.default_rng(1).integers(0, 256, 70_000, dtype=np.uint8))
-    sums = Sums(block)
+    sums = FletcherSums(block)
     for first, end in ((0, 0), (0, 1), (5, 97), (69_000, 70_000), (3, 65_000)):
         assert sums.of(first, end) == pyubx2.calc_checksum(block[first:end])
 

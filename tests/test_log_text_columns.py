@@ -34,7 +34,7 @@ def pieces_of_seven(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sources, "PIECE", 7)
 
 
-def written(path: Path, **columns: list[object]) -> sources.Source:
+def written(path: Path, **columns: list[object]) -> sources.RowSource:
     pl.DataFrame(columns).write_parquet(path)
     return sources.opened(path)
 

@@ -15,7 +15,7 @@ from diagnosis_samples import DESIGN, LATENCY, diagnosis
 from html_page import Page
 from syncline_design.comparison.meaning import DiagnosisAndDesign, ErrorFigure
 from syncline_design.diagnosis.findings import estimate, finding
-from syncline_design.diagnosis.result import Motion, Rival, WholeGap
+from syncline_design.diagnosis.result import MotionQuantiles, Rival, WholeGap
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.model.known import EffectEntry
@@ -281,7 +281,10 @@ def test_markdown_of_a_diagnosis_says_what_the_page_says_of_gap_and_log() -> Non
 
 def test_a_page_and_the_console_say_alike_what_a_log_varied() -> None:
     """The page showed the record: `speed low 0.8178, high 7.826, unit m/s`."""
-    motion = {"speed": Motion(0.81784, 7.8261, "m/s"), "turn_rate": Motion(-23.604, 23.37, "deg/s")}
+    motion = {
+        "speed": MotionQuantiles(0.81784, 7.8261, "m/s"),
+        "turn_rate": MotionQuantiles(-23.604, 23.37, "deg/s"),
+    }
     plain = diagnosis()
     document = on_diagnosis(replace(plain, log=replace(plain.log, motion=motion)))
     wanted = "speed 0.818 to 7.83 m/s, turn rate \u221223.6 to 23.4 deg/s"

@@ -16,7 +16,7 @@ from syncline_design.machine.deadline import Deadline, a_command, limit_command,
 from syncline_design.machine.result_files import write_file
 from syncline_design.report.write import (
     OutputError,
-    Target,
+    OutputTarget,
     apart,
     check_targets,
     parse_target,
@@ -27,17 +27,17 @@ KNOWN = ("json", "html")
 
 
 def test_parse_target() -> None:
-    assert parse_target("html:out/a.html", KNOWN) == Target("html", "out/a.html")
-    assert parse_target("json:-", KNOWN) == Target("json", "-")
-    assert parse_target("json", KNOWN) == Target("json", "-")
-    assert parse_target("html:C:/x.html", KNOWN) == Target("html", "C:/x.html")
+    assert parse_target("html:out/a.html", KNOWN) == OutputTarget("html", "out/a.html")
+    assert parse_target("json:-", KNOWN) == OutputTarget("json", "-")
+    assert parse_target("json", KNOWN) == OutputTarget("json", "-")
+    assert parse_target("html:C:/x.html", KNOWN) == OutputTarget("html", "C:/x.html")
 
 
 def test_a_page_without_a_path_replaces_only_pages_of_ours(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert parse_target("html", KNOWN, "own-check") == Target("html", "own-check.html", False)
+    assert parse_target("html", KNOWN, "own-check") == OutputTarget("html", "own-check.html", False)
     page = tmp_path / "own-check.html"
     page.write_text('<meta name="generator" content="syncline-design">', encoding="utf-8")
     assert parse_target("html", KNOWN, "own-check").path == "own-check.html"
@@ -62,19 +62,27 @@ def test_names_that_no_file_can_have_are_refused(
     """The first wrote a file `new`, the last was an internal error."""
     monkeypatch.chdir(tmp_path)
     with pytest.raises(OutputError, match=words):
-        check_targets([Target("json", path)])
+        check_targets([OutputTarget("json", path)])
 
 
 def test_a_spec_and_a_result_go_to_two_files(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to("fixed.yaml")
     with pytest.raises(OutputError, match="two outputs go to"):
-        apart(tmp_path / "fixed.yaml", [Target("json", "-"), Target("json", f"{tmp_path}/link")])
-    apart(tmp_path / "fixed.yaml", [Target("json", "-"), Target("json", f"{tmp_path}/other")])
+        apart(
+            tmp_path / "fixed.yaml",
+            [OutputTarget("json", "-"), OutputTarget("json", f"{tmp_path}/link")],
+        )
+    apart(
+        tmp_path / "fixed.yaml",
+        [OutputTarget("json", "-"), OutputTarget("json", f"{tmp_path}/other")],
+    )
 
 
 def test_writes_files_and_folders(tmp_path: Path) -> None:
     target = tmp_path / "new" / "deep" / "a.json"
-    write_outputs([(Target("json", str(target)), "{}\n"), (Target("html", f"{tmp_path}/b"), "µ")])
+    write_outputs(
+        [(OutputTarget("json", str(target)), "{}\n"), (OutputTarget("html", f"{tmp_path}/b"), "µ")]
+    )
     assert target.read_text() == "{}\n"
     assert (tmp_path / "b").read_bytes() == "µ".encode()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["b", "new"]
@@ -86,7 +94,9 @@ def test_permissions_are_those_of_a_new_or_of_the_old_file(tmp_path: Path) -> No
     old.chmod(0o640)
     mask = os.umask(0o027)
     try:
-        write_outputs([(Target("json", str(old)), "y"), (Target("html", str(new)), "z")])
+        write_outputs(
+            [(OutputTarget("json", str(old)), "y"), (OutputTarget("html", str(new)), "z")]
+        )
     finally:
         os.umask(mask)
     assert stat.S_IMODE(old.stat().st_mode) == 0o640
@@ -105,7 +115,7 @@ def test_text_reaches_the_disk_before_it_takes_the_old_files_place(
         sync(descriptor)
 
     monkeypatch.setattr(os, "fsync", watched)
-    write_outputs([(Target("json", str(path)), "new text")])
+    write_outputs([(OutputTarget("json", str(path)), "new text")])
     assert seen[0] == (len("new text"), "old")
 
 
@@ -114,38 +124,38 @@ def test_symlink_is_written_through(tmp_path: Path) -> None:
     real.write_text("old")
     link = tmp_path / "link.json"
     link.symlink_to(real)
-    write_outputs([(Target("json", str(link)), "new")])
+    write_outputs([(OutputTarget("json", str(link)), "new")])
     assert link.is_symlink()
     assert real.read_text() == "new"
 
 
 def test_stdout_gets_utf8_and_a_final_newline(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
-    write_outputs([(Target("json", "-"), "τ")])
+    write_outputs([(OutputTarget("json", "-"), "τ")])
     sys.stdout.flush()
     assert capfdbinary.readouterr().out == "τ\n".encode()
 
 
 def test_two_targets_must_not_collide(tmp_path: Path) -> None:
-    same = [Target("json", str(tmp_path / "a")), Target("html", f"{tmp_path}/x/../a")]
+    same = [OutputTarget("json", str(tmp_path / "a")), OutputTarget("html", f"{tmp_path}/x/../a")]
     with pytest.raises(OutputError, match="two outputs"):
         check_targets(same)
     with pytest.raises(OutputError, match="standard output"):
-        check_targets([Target("json", "-"), Target("html", "-")])
+        check_targets([OutputTarget("json", "-"), OutputTarget("html", "-")])
 
 
 def test_a_folder_is_no_target(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="is a folder"):
-        check_targets([Target("json", str(tmp_path))])
+        check_targets([OutputTarget("json", str(tmp_path))])
 
 
 def test_a_file_is_no_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     with pytest.raises(OutputError, match="is not a folder"):
-        check_targets([Target("json", str(tmp_path / "file" / "a.json"))])
+        check_targets([OutputTarget("json", str(tmp_path / "file" / "a.json"))])
 
 
 def test_devices_are_written_to() -> None:
-    target = Target("json", os.devnull)
+    target = OutputTarget("json", os.devnull)
     check_targets([target])
     write_outputs([(target, "{}")])
     assert not Path(os.devnull).is_file()
@@ -154,7 +164,7 @@ def test_devices_are_written_to() -> None:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
 def test_full_device_is_a_clear_error() -> None:
     with pytest.raises(OutputError, match=r"/dev/full: cannot write: No space left"):
-        write_outputs([(Target("json", "/dev/full"), "{}")])
+        write_outputs([(OutputTarget("json", "/dev/full"), "{}")])
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
@@ -163,7 +173,7 @@ def test_full_standard_output_is_a_clear_error_and_nothing_more() -> None:
         "import sys\n"
         "from syncline_design.report.write import *\n"
         "try:\n"
-        "    write_outputs([(Target('json', '-'), 'x' * 100000)])\n"
+        "    write_outputs([(OutputTarget('json', '-'), 'x' * 100000)])\n"
         "except OutputError as error:\n"
         "    print(error, file=sys.stderr)\n"
         "    sys.exit(3)\n"
@@ -181,7 +191,7 @@ def test_full_standard_output_is_a_clear_error_and_nothing_more() -> None:
 
 
 def _with_file_limit(
-    size: int, pairs: list[tuple[Target, str]]
+    size: int, pairs: list[tuple[OutputTarget, str]]
 ) -> pytest.ExceptionInfo[OutputError]:
     """Write while no file may grow beyond `size` bytes, as on a disk that fills up."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -198,7 +208,10 @@ def test_full_disk_leaves_every_old_file(tmp_path: Path) -> None:
     first, second = tmp_path / "a.json", tmp_path / "b.html"
     first.write_text("old a")
     second.write_text("old b")
-    pairs = [(Target("json", str(first)), "small"), (Target("html", str(second)), "x" * 100_000)]
+    pairs = [
+        (OutputTarget("json", str(first)), "small"),
+        (OutputTarget("html", str(second)), "x" * 100_000),
+    ]
     caught = _with_file_limit(4096, pairs)
     assert "b.html: cannot write" in str(caught.value)
     assert "the file that was there is unchanged" in str(caught.value)
@@ -208,7 +221,9 @@ def test_full_disk_leaves_every_old_file(tmp_path: Path) -> None:
 
 
 def test_full_disk_leaves_nothing_half_written(tmp_path: Path) -> None:
-    caught = _with_file_limit(4096, [(Target("html", str(tmp_path / "n.html")), "x" * 100_000)])
+    caught = _with_file_limit(
+        4096, [(OutputTarget("html", str(tmp_path / "n.html")), "x" * 100_000)]
+    )
     assert "nothing was written" in str(caught.value)
     assert list(tmp_path.iterdir()) == []
 
@@ -218,14 +233,14 @@ def test_unwritable_folder_is_a_clear_error(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     try:
         with pytest.raises(OutputError, match="no permission"):
-            check_targets([Target("json", str(tmp_path / "a.json"))])
+            check_targets([OutputTarget("json", str(tmp_path / "a.json"))])
     finally:
         tmp_path.chmod(0o700)
 
 
 def test_a_folder_that_cannot_be_made_is_a_clear_error() -> None:
     with pytest.raises(OutputError, match="cannot write"):
-        write_outputs([(Target("json", "/proc/no/such/a.json"), "{}")])
+        write_outputs([(OutputTarget("json", "/proc/no/such/a.json"), "{}")])
 
 
 def test_a_pipe_that_nobody_reads_ends_with_the_time_limit(tmp_path: Path) -> None:

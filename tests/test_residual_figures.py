@@ -15,9 +15,9 @@ from syncline_design.diagnosis.plotted import (
     AxisResiduals,
     NormalPlot,
     Plots,
+    PlottedTrack,
     Residuals,
     Spectrum,
-    Track,
 )
 from syncline_design.diagnosis.remainder_plots import normal_of, spectrum_of, track_of
 from syncline_design.report import charts_residuals as drawings
@@ -119,7 +119,7 @@ def test_the_caption_names_what_the_residuals_changed_with_and_every_figure_draw
     found = charts(
         residuals=Residuals(tuple(time_s), axes),
         motion={"speed": tuple(speed), "range": tuple(0.0 * speed + 30.0)},
-        track=Track((0.0, 7.0), (0.0, 14.0), arrows),
+        track=PlottedTrack((0.0, 7.0), (0.0, 14.0), arrows),
         spectrum=Spectrum((0.1, 1.0), (1.0, 1.1), (2.0, 1.5)),
         normal=NormalPlot((-2.0, 0.0, 2.0), (-2.0, 0.0, 2.0)),
     )

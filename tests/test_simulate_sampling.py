@@ -30,7 +30,7 @@ from syncline_design.simulation import (
     worker,
     worst_cases,
 )
-from syncline_design.simulation.distribution import Binned, Values, add_counts, no_counts
+from syncline_design.simulation.distribution import Binned, ErrorValues, add_counts, no_counts
 from syncline_design.simulation.draws import RandomSource, generator, timing_draw, timing_draws
 from syncline_design.simulation.intervals import proportion_interval
 from syncline_design.simulation.run import look_sizes, quantile_estimates
@@ -241,7 +241,7 @@ def test_many_samples_are_binned_and_agree_with_kept_ones(monkeypatch) -> None:
     kept = run.error_distribution(fixed_wing(), settings)
     monkeypatch.setattr(run, "KEPT_VALUES", 1000)
     binned = run.error_distribution(fixed_wing(), settings)
-    assert isinstance(kept, Values)
+    assert isinstance(kept, ErrorValues)
     assert isinstance(binned, Binned)
     assert binned.count == kept.count == 100_000
     for rank in (1, 10, 50_000, 95_000, 99_999, 100_000):
@@ -259,13 +259,13 @@ def test_distributions_of_odd_errors() -> None:
     errors = np.array([0.0, 1e-300, 1e-3, 1e9, math.inf, math.nan])
     counts = no_counts()
     add_counts(counts, errors)
-    for found in (Values(errors), Binned(counts)):
+    for found in (ErrorValues(errors), Binned(counts)):
         assert found.count == 6
         assert found.order_statistics([0])[0] == 0.0
         assert found.order_statistics([7])[0] == math.inf
         assert found.within(1.0) == 3
         assert not found.order_statistics([6])[0] <= 1e300
-    assert Values(np.array([math.nan])).within(math.inf) == 0
+    assert ErrorValues(np.array([math.nan])).within(math.inf) == 0
 
 
 def test_quantile_intervals_cover() -> None:
@@ -283,7 +283,7 @@ def test_quantile_intervals_cover() -> None:
     for seed in range(1000):
         settings = SimulationSettings(500, seed=seed, quantiles=quantiles, limit_m=limit, workers=1)
         kept = sampling.job_errors(gaussian_ball(), settings, 0, 500)
-        found = Values(np.linalg.norm(kept, axis=0))
+        found = ErrorValues(np.linalg.norm(kept, axis=0))
         for k, quantile in enumerate(quantiles):
             estimate = quantile_estimates(found, (quantile,), 0.95)[0]
             covered[k] += estimate.low_m <= exact[k] <= estimate.high_m

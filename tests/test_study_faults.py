@@ -28,7 +28,7 @@ from syncline_design.studies import (
 )
 from syncline_design.studies.case import CaseSettings, case_keys
 from syncline_design.studies.loading import load_study
-from syncline_design.studies.pool import MAX_DEATHS, Pool
+from syncline_design.studies.pool import MAX_DEATHS, WorkerPool
 from syncline_design.studies.record import CaseRecord
 from syncline_design.studies.store import Store
 
@@ -287,7 +287,7 @@ def test_a_case_without_verdict_is_tried_again(
 @needs_proc
 def test_a_case_that_kills_every_worker_ends_without_verdict(tmp_path: Path) -> None:
     study = load_study(write(tmp_path))
-    pool = Pool(study, CaseSettings.now(0, None), 1)
+    pool = WorkerPool(study, CaseSettings.now(0, None), 1)
     stop = threading.Event()
 
     def kill_all() -> None:

@@ -17,7 +17,7 @@ from typer.testing import CliRunner, Result
 
 import syncline_design as sd
 from syncline_design.campaign.changes import REACH, Changes, weight_of
-from syncline_design.campaign.kept import Named, Run, date_of, statistics_of
+from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.store import add_run
 from syncline_design.cli.app import app
@@ -52,7 +52,9 @@ def statistics(rng: np.random.Generator, values: np.ndarray) -> Sufficient:
     )  # fmt: skip
 
 
-def run_of(found: Sufficient, day: int, date: bool = True, named: tuple[Named, ...] = ()) -> Run:
+def run_of(
+    found: Sufficient, day: int, date: bool = True, named: tuple[NamedAlone, ...] = ()
+) -> Run:
     first = (FIRST if date else 0.0) + DAY * day
     return Run(
         (f"day{day}.csv",), f"{day:064d}", "georeference", first, date_of(first), 60.0, ROWS, ROWS,
@@ -250,7 +252,9 @@ def test_what_differs_from_run_to_run_does_not_ring_for_ever(spec: Path, tmp_pat
 
 def test_a_convention_that_is_another_rings(spec: Path, tmp_path: Path) -> None:
     found = series(16, 4, 0.0 * BOUND, 9)
-    word = Named("frame_convention", "attitude", "car", "Axes of attitude are east-north-up", True)
+    word = NamedAlone(
+        "frame_convention", "attitude", "car", "Axes of attitude are east-north-up", True
+    )
     runs = [run_of(one, day, named=(word,) if day > 2 else ()) for day, one in enumerate(found)]
     (alarm,) = told(spec, kept(spec, tmp_path, runs), tmp_path, 1)["alarms"]
     assert (alarm["effect"], alarm["change"], alarm["since"]["run"]) == (

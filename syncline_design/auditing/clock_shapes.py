@@ -54,7 +54,7 @@ class Shape:
         return np.asarray(away if self.kind == "ramp" else away * back)
 
 
-Family = tuple[list[Shape], Array]
+ShapeFamily = tuple[list[Shape], Array]
 
 
 def _legendre(time_s: Array, shape: Shape) -> Array:
@@ -83,7 +83,7 @@ def straddling(shapes: tuple[Shape, ...], time_s: Array, within_s: float) -> Mas
     return out
 
 
-def families(time_s: Array) -> Iterator[Family]:
+def families(time_s: Array) -> Iterator[ShapeFamily]:
     first, last = float(time_s[0]), float(time_s[-1])
     edges = 0.5 * (time_s[1:] + time_s[:-1])
     drift = [Shape("drift", begin_s=first, end_s=last)]

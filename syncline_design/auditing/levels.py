@@ -18,8 +18,8 @@ from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.clock_shapes import (
     KNOTS,
     SETTLINGS,
-    Family,
     Shape,
+    ShapeFamily,
     around,
     course,
     families,
@@ -163,7 +163,7 @@ def _rest(time_s: Array, low: Array, shapes: tuple[Shape, ...]) -> Array:
 
 def _best(
     time_s: Array, low: Array, found: tuple[Shape, ...], blocks: Blocks,
-    families: tuple[Family, ...], keep: Mask,
+    families: tuple[ShapeFamily, ...], keep: Mask,
 ) -> Shape | None:  # fmt: skip
     """The shape that explains most of what is left, in units of the noise."""
     base = np.linalg.qr(_columns(found, time_s))[0]

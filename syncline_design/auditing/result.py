@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal
 
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 
 SCHEMA: Final = "syncline-design/audit/v1"
 FaultName = Literal[
@@ -148,7 +148,7 @@ class IncompleteFile(Record):
 class Audit(Record):
     """All streams of all files.  `incomplete`: the first of the damaged files, `damaged` each."""
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     verdict: Soundness
     streams: tuple[StreamAudit, ...]
     incomplete: IncompleteFile | None = optional()

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from syncline_design import __version__
-from syncline_design.campaign.kept import Named, Run, date_of, statistics_of
-from syncline_design.diagnosis.consequence import Promise
+from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
+from syncline_design.diagnosis.consequence import SpecPromise
 from syncline_design.diagnosis.result import Finding
-from syncline_design.diagnosis.run import Examined, examined, weigh
-from syncline_design.diagnosis.search import DiagnosisSettings, Progress, silent
+from syncline_design.diagnosis.run import SearchedLog, examined, weigh
+from syncline_design.diagnosis.search import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.sufficient import sufficient
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
@@ -23,8 +23,8 @@ def run_of(
     case: Case,
     paths: Sequence[Path],
     settings: DiagnosisSettings,
-    promise: Promise | None = None,
-    progress: Progress = silent,
+    promise: SpecPromise | None = None,
+    progress: SearchProgress = silent,
 ) -> Run:
     """What is kept of one run, read from one file or several."""
     digest = content_hash(paths)
@@ -44,7 +44,7 @@ def _plain(path: Path) -> list[Path]:
     return sorted(f for f in path.rglob("*") if f.is_file()) if path.is_dir() else [path]
 
 
-def kept(one: Examined, digest: str, promise: Promise | None) -> Run:
+def kept(one: SearchedLog, digest: str, promise: SpecPromise | None) -> Run:
     """What is kept of a searched log."""
     data, model = one.data, one.result.model
     weighed = weigh(one, promise)
@@ -72,7 +72,7 @@ def kept(one: Examined, digest: str, promise: Promise | None) -> Run:
     )
 
 
-def _named(one: Finding) -> Named:
+def _named(one: Finding) -> NamedAlone:
     effect = registry().get(one.effect)
     undone = effect is not None and effect.undoing is not None
-    return Named(one.effect, one.sensor, one.stage, one.sentence, undone)
+    return NamedAlone(one.effect, one.sensor, one.stage, one.sentence, undone)

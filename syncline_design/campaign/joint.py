@@ -20,7 +20,7 @@ from syncline_design.campaign.store import (
 from syncline_design.campaign.telling import Told, tell
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.result import Diagnosis
-from syncline_design.diagnosis.search import DiagnosisSettings, Progress, silent
+from syncline_design.diagnosis.search import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
@@ -60,7 +60,7 @@ def diagnose_joint(
     case: Case,
     request: JointRequest,
     settings: DiagnosisSettings | None = None,
-    progress: Progress = silent,
+    progress: SearchProgress = silent,
 ) -> Diagnosis:
     """What several logs say together.
 

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.packing import PackingError, lower, packed, unpacked, whole
-from syncline_design.diagnosis.sufficient import Label, Less, Sufficient
+from syncline_design.diagnosis.sufficient import Less, Sufficient, TermLabel
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 
@@ -21,7 +21,7 @@ MOST_PARTS: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Named(Record):
+class NamedAlone(Record):
     """What the log alone named: effect, sensor, stage, convention in words where it is one."""
 
     effect: str
@@ -66,7 +66,7 @@ class Run(Record):
     left_material: bool
     spec_m: float
     white_factor: Mapping[str, float]
-    named: tuple[Named, ...]
+    named: tuple[NamedAlone, ...]
     version: str
     parameters: tuple[str, ...]
     normal: str
@@ -100,7 +100,7 @@ class Run(Record):
         return Sufficient(labels, normal, unpacked(self.score, (p,)), self.square, gram, less)
 
 
-def label_of(text: str) -> Label:
+def label_of(text: str) -> TermLabel:
     """`latency/position/0/latency_s` -> its parts; PackingError where it is none."""
     parts = text.split("/")
     if len(parts) != 4 or not parts[2].isdecimal():
@@ -108,7 +108,7 @@ def label_of(text: str) -> Label:
     return parts[0], parts[1], int(parts[2]), parts[3]
 
 
-def text_of(label: Label) -> str:
+def text_of(label: TermLabel) -> str:
     """A label as a run keeps it."""
     return "/".join(map(str, label))
 

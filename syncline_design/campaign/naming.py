@@ -37,7 +37,7 @@ ROUNDS: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Beside:
+class WorseFit:
     """Another effect in a named one's place: how much worse it fits [nat], freedom counted."""
 
     term: Term
@@ -70,11 +70,11 @@ class NamedTerm:
     gain: float
     log_p: float
     tested: Tested
-    rivals: tuple[Beside, ...]
+    rivals: tuple[WorseFit, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Named:
+class NamedTogether:
     """All that was named, with the fit of it."""
 
     fit: Fitted
@@ -108,7 +108,7 @@ class Naming:
         total = sum(SHARE[one] for one in self.scopes)
         return math.log(len(self.terms) * total / SHARE[scope])
 
-    def named(self) -> Named:
+    def named(self) -> NamedTogether:
         """The search."""
         model = fitted(self.pool, ())
         while len(model.scoped) < self.most:
@@ -117,7 +117,7 @@ class Naming:
                 break
             model = self._exchanged(self._scoped(found))
         model = self._pruned(model)
-        return Named(model, tuple(self._told(model, k) for k in range(len(model.scoped))))
+        return NamedTogether(model, tuple(self._told(model, k) for k in range(len(model.scoped))))
 
     def _free(self, model: Fitted) -> Iterator[Scoped]:
         taken = {one.term.label for one in model.scoped}
@@ -220,7 +220,7 @@ class Naming:
         scoped[k] = replace(scoped[k], term=term)
         return fitted(self.pool, tuple(scoped))
 
-    def rivals(self, model: Fitted, k: int) -> list[Beside]:
+    def rivals(self, model: Fitted, k: int) -> list[WorseFit]:
         """Every other effect in the place of one, the rest fitted again."""
         taken = {one.term.label for one in model.scoped}
         own = freedom(model, k)
@@ -230,7 +230,7 @@ class Naming:
                 continue
             trial = self._replaced(model, k, term)
             worse = model.gain - own - (trial.gain - freedom(trial, k))
-            found.append(Beside(term, worse, self._cosine(model, k, term), plausible(trial)))
+            found.append(WorseFit(term, worse, self._cosine(model, k, term), plausible(trial)))
         return sorted(found, key=lambda b: b.worse)
 
     def _cosine(self, model: Fitted, k: int, term: Term) -> float:

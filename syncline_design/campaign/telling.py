@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from syncline_design.campaign.kept import Run
-from syncline_design.campaign.naming import Beside, Named, NamedTerm
+from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
 from syncline_design.campaign.pool import Pool, Scoped, Term, fitted
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.diagnosis.candidates import zero_values
@@ -37,7 +37,7 @@ from syncline_design.diagnosis.result import (
 )
 from syncline_design.diagnosis.run import provenance_of
 from syncline_design.diagnosis.search import DiagnosisSettings
-from syncline_design.diagnosis.sight import Seen, alone, informative
+from syncline_design.diagnosis.sight import DetectionLimit, alone, informative
 from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
@@ -57,7 +57,7 @@ class Told:
     entries: tuple[Entry, ...]
     before: int
     pool: Pool
-    named: Named
+    named: NamedTogether
     stored: Stored | None
     torn: int
 
@@ -142,7 +142,7 @@ def _odds(worse: float) -> float:
     return math.exp(-min(max(worse, -MOST_NATS), MOST_NATS))
 
 
-def _rival(told: Told, one: Beside) -> Rival:
+def _rival(told: Told, one: WorseFit) -> Rival:
     name, sensor, stage = one.term.label
     return Rival(name, sensor, told.stages[stage], one.cosine, one.worse, one.possible)
 
@@ -205,7 +205,7 @@ def _undone(told: Told) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _seen(told: Told) -> Iterator[Seen]:
+def _seen(told: Told) -> Iterator[DetectionLimit]:
     """The smallest value common to all logs that half of such sets of logs would show."""
     taken = {one.term.label for one in told.named.fit.scoped}
     doubles = {b.term.label for one in told.named.terms for b in one.rivals}
@@ -219,7 +219,7 @@ def _seen(told: Told) -> Iterator[Seen]:
         effect, stage = term.effect, told.stages[term.stage]
         entry = EffectEntry(effect.name, term.sensor, stage, tuple(zero_values(effect).items()))
         for p, value in zip(effect.slopes(), size, strict=True):
-            yield Seen(entry, p.name, float(value), p.high)
+            yield DetectionLimit(entry, p.name, float(value), p.high)
 
 
 def _smallest(judged: Judged, log_p: float) -> Array:

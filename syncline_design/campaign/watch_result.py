@@ -6,7 +6,7 @@ from typing import Annotated, Final, Literal
 
 from syncline_design.diagnosis.result import LogOutcome, SpecRead
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.figure_text import to_digits
 
 SCHEMA: Final = "syncline-design/watch/v1"
@@ -132,7 +132,7 @@ class Watch(Record):
     last: hash of the store's last line.  torn: bytes of a line that a kill had left.
     """
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     verdict: WatchOutcome
     spec: SpecRead
     store: str

@@ -43,7 +43,7 @@ from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.findings import estimate
 from syncline_design.diagnosis.result import SpecRead
-from syncline_design.diagnosis.search import DiagnosisSettings, Progress, silent
+from syncline_design.diagnosis.search import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
@@ -79,7 +79,7 @@ def watch(
     case: Case,
     request: WatchRequest,
     settings: DiagnosisSettings | None = None,
-    progress: Progress = silent,
+    progress: SearchProgress = silent,
 ) -> Watch:
     """Add a run to a store, and say what changed since when.
 
@@ -119,7 +119,7 @@ def _add(
     request: WatchRequest,
     stored: Stored | None,
     settings: DiagnosisSettings,
-    progress: Progress,
+    progress: SearchProgress,
 ) -> None:
     if stored is not None:
         demand_known(stored, content_hash(request.files), request.files)

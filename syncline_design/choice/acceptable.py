@@ -17,12 +17,12 @@ from syncline_design.choice.narrowed import Narrowed, kept
 from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Deadline
 from syncline_design.choice.ranked import iter_best
-from syncline_design.choice.table import Design, Judgement, Problem
+from syncline_design.choice.table import Design, Problem, SimulatedJudgement
 
 
 def iter_acceptable(
     problem: Problem, deadline: Deadline | None = None
-) -> Iterator[tuple[Design, Judgement]]:
+) -> Iterator[tuple[Design, SimulatedJudgement]]:
     """Designs that meet all requirements, best first; those that simulation leaves open as such."""
     for design, found in iter_judged(problem, deadline):
         if not found.failed:
@@ -31,7 +31,7 @@ def iter_acceptable(
 
 def iter_judged(
     problem: Problem, deadline: Deadline | None = None
-) -> Iterator[tuple[Design, Judgement]]:
+) -> Iterator[tuple[Design, SimulatedJudgement]]:
     """Designs that keep every sum, best first, with what simulation says of them.
 
     From the first that fails on, sensors whose noise alone fails are left out.

@@ -43,12 +43,12 @@ def iter_first(
     cuts: without those that the judge has learned to fail by their sums.
     """
     if not is_empty(problem):
-        yield from Search(problem, cuts=cuts).run(deadline, most_steps)
+        yield from BestFirstSearch(problem, cuts=cuts).run(deadline, most_steps)
 
 
 def lower_bound(problem: Problem) -> Amount:
     """What no design can go below in the objective: shared hardware and later roles for free."""
-    return Search(problem).bound()
+    return BestFirstSearch(problem).bound()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class _Limit:
     suffixes: list[tuple[Floats, Column]]
 
 
-class Search:
+class BestFirstSearch:
     """A search over one problem's tables; its designs in order, or its bound."""
 
     def __init__(self, problem: Problem, *, cuts: bool = False) -> None:

@@ -78,7 +78,7 @@ NO_WAY = np.array([-1], dtype=np.intp)
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class StageMotion:
     """How a stage moves, exactly: v_max [m/s], d [m] (0 without ranging), omega_max [rad/s].
 
     nearest: the other end of its distances [m], where it has several.
@@ -91,7 +91,7 @@ class Motion:
     nearest: Fraction | None = None
 
     @property
-    def near_end(self) -> Motion | None:
+    def near_end(self) -> StageMotion | None:
         """The stage at the near end of its distances; None where it has only one."""
         if self.nearest is None or self.nearest == self.distance:
             return None
@@ -112,7 +112,7 @@ class Motion:
         return self.speed + self.turning
 
 
-def sensor_error(sensor: SensorEntry, role: RoleName, motion: Motion) -> Fraction:
+def sensor_error(sensor: SensorEntry, role: RoleName, motion: StageMotion) -> Fraction:
     """A role's term of the sensor-induced error [m] (eq. sensor_error_ub)."""
     if not motion.lets_in(role):
         return Fraction(0)
@@ -131,7 +131,7 @@ def _range_sigma(sensor: SensorEntry, distance: Fraction) -> Fraction:
     return sigma.at(distance) if isinstance(sigma, NoiseTable) and by_range else fraction_of(sigma)
 
 
-def bends_of(sensor: SensorEntry, role: RoleName, motion: Motion) -> tuple[Bend, ...]:
+def bends_of(sensor: SensorEntry, role: RoleName, motion: StageMotion) -> tuple[Bend, ...]:
     """What a sensor's error is where its noise by range bends inside the stage's distances."""
     sigma, near = sensor.sigma_range, motion.near_end
     if role != "ranging" or near is None or not isinstance(sigma, NoiseTable):
@@ -147,7 +147,7 @@ def bends_of(sensor: SensorEntry, role: RoleName, motion: Motion) -> tuple[Bend,
 
 
 def underway_m(
-    sensor: SensorEntry, role: RoleName, motion: Motion, case: Case, stage: StageCase
+    sensor: SensorEntry, role: RoleName, motion: StageMotion, case: Case, stage: StageCase
 ) -> Fraction:
     """What a sensor adds by sound under way and by interpolation [m]: see model/underway.py.
 
@@ -184,18 +184,18 @@ def may_be_underway(case: Case) -> bool:
     )
 
 
-def own_rate(role: RoleName, motion: Motion) -> Fraction | None:
+def own_rate(role: RoleName, motion: StageMotion) -> Fraction | None:
     """What a sensor's own tau_crit is taken against [m/s]; None where motion does not matter."""
     rate = motion.speed if role == "position" else motion.rate
     return rate if motion.lets_in(role) and rate > 0 else None
 
 
-def motion_of(stage: StageCase) -> Motion:
+def motion_of(stage: StageCase) -> StageMotion:
     """How the platform of a stage moves."""
     platform, ranges = stage.platform.entry, stage.role("ranging") is not None
     distance = fraction_of(platform.distance) if ranges else Fraction(0)
     nearest = fraction_of(stage.distances[0]) if stage.choice.distance is not None else None
-    return Motion(
+    return StageMotion(
         fraction_of(platform.v_max), distance, fraction_of(platform.omega_max), ranges, nearest
     )
 
@@ -214,7 +214,7 @@ class Candidates:
     case: Case
     stage: StageCase
     role: RoleCase
-    motion: Motion
+    motion: StageMotion
     effects: tuple[SensorEffects, ...]
     barred: tuple[RuledOut | None, ...]
     ways: tuple[Way, ...]
@@ -250,7 +250,7 @@ class Candidates:
             self.motion.speed, self.motion.nearest,
         )  # fmt: skip
 
-    def moved(self, table: RoleTable, motion: Motion, limits: Limits) -> RoleTable:
+    def moved(self, table: RoleTable, motion: StageMotion, limits: Limits) -> RoleTable:
         """A table of these candidates where the stage moves in another way."""
         there, pool = replace(self, motion=motion, made={}), table.anywhere()
         error, added, crit, nearer = (figure[pool.sensor] for figure in there._figures())
@@ -267,7 +267,7 @@ class Candidates:
         return own_rate(self.role.role, self.motion)
 
     @property
-    def _near(self) -> Motion | None:
+    def _near(self) -> StageMotion | None:
         """The near end of the stage's distances, where it matters to the role."""
         return None if self.role.role == "position" else self.motion.near_end
 
@@ -294,7 +294,7 @@ class Candidates:
                     crit[place] = min(crit[place], bend.crit_s)
         return error, added, crit, nearer
 
-    def _eased(self, near: Motion) -> Floats:
+    def _eased(self, near: StageMotion) -> Floats:
         """By how much the range noise of each sensor is smaller at the near end [m]."""
         found = np.zeros(len(self.fixed))
         if self.role.role == "ranging":

@@ -11,7 +11,7 @@ from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
 from syncline_design.model import timing
 from syncline_design.model.roles import ROLES, RoleName
-from syncline_design.model.system import UTC, Look, Platform, Sensor, Shape, Stage, System
+from syncline_design.model.system import UTC, Look, Platform, Sensor, ShareCurve, Stage, System
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
     ClockEntry,
@@ -148,7 +148,7 @@ def _shapes(stage: StageCase, entry: SensorEntry) -> dict[str, Any]:
     return found
 
 
-def _shares(table: NoiseTable, places: Sequence[Fraction]) -> Shape:
+def _shares(table: NoiseTable, places: Sequence[Fraction]) -> ShareCurve:
     return tuple((float(one), float(table.at(one) / table.exact)) for one in places)
 
 

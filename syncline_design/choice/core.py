@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from syncline_design.choice.evaluate import Known, known_or_more, resource_of
+from syncline_design.choice.evaluate import Incumbent, known_or_more, resource_of
 from syncline_design.choice.narrowed import Narrowed, narrowed, whole_of
 from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, Options
 from syncline_design.choice.partition import best_of
@@ -101,7 +101,12 @@ def total_least(problem: Problem, r: int, options: Options) -> Floats:
 
 
 def may_improve(
-    problem: Problem, known: Known, amount: Floats, total: Floats, others: Stairs, beside: Beside
+    problem: Problem,
+    known: Incumbent,
+    amount: Floats,
+    total: Floats,
+    others: Stairs,
+    beside: Beside,
 ) -> Bools:
     """Whether options of these least figures can be part of a design no worse than a known one."""
     limit = problem.limits.accuracy_m
@@ -118,7 +123,7 @@ def may_improve(
     return np.asarray(cheaper | (least + no_worse <= as_much))
 
 
-def core(problem: Problem, known: Known, beside: Beside) -> Narrowed:
+def core(problem: Problem, known: Incumbent, beside: Beside) -> Narrowed:
     """The problem without the options that no design as good as a known one can have."""
     every = range(len(problem.roles))
     rows: dict[int, Indices] = {}
@@ -135,7 +140,7 @@ def core(problem: Problem, known: Known, beside: Beside) -> Narrowed:
 def best_from(problem: Problem, design: Design | None, beside: Beside) -> Design | None:
     """The best design in the documented order, starting from one that is at hand."""
     in_force().check()
-    known = None if design is None else Known.of(problem, design)
+    known = None if design is None else Incumbent.of(problem, design)
     if known is None:
         return best_of(whole_of(problem), in_force())
     left = core(problem, known, beside)

@@ -28,7 +28,7 @@ from syncline_design.choice.outcome import (
 )
 from syncline_design.choice.partition import iter_differing
 from syncline_design.choice.ranked import iter_best
-from syncline_design.choice.table import Design, Judgement, Problem, is_empty
+from syncline_design.choice.table import Design, Problem, SimulatedJudgement, is_empty
 from syncline_design.machine.deadline import in_force
 
 SMALL = 300  # combinations up to which the automatic road also enumerates
@@ -190,8 +190,8 @@ def _outcome(
 
 
 def _until_unfinished(
-    designs: Iterator[tuple[Design, Judgement]],
-) -> Iterator[tuple[Design, Judgement]]:
+    designs: Iterator[tuple[Design, SimulatedJudgement]],
+) -> Iterator[tuple[Design, SimulatedJudgement]]:
     """Designs until too many were simulated, which the judge remembers."""
     with suppress(Unfinished):
         yield from designs

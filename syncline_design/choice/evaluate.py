@@ -251,7 +251,7 @@ def rank(problem: Problem, design: Design, found: Evaluation) -> Rank:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class Incumbent:
     """A design that meets every sum: what others have to come below."""
 
     design: Design
@@ -259,7 +259,7 @@ class Known:
     total_m: float
 
     @classmethod
-    def of(cls, problem: Problem, design: Design) -> Known | None:
+    def of(cls, problem: Problem, design: Design) -> Incumbent | None:
         """None where the design breaks a requirement."""
         found = evaluate(problem, design)
         if broken(problem, found):

@@ -23,7 +23,7 @@ from syncline_design.choice.outcome import (
     RoleGap,
     cut_short_words,
 )
-from syncline_design.choice.parts import Part, is_feasible, lifted, parts_of
+from syncline_design.choice.parts import ConflictPart, is_feasible, lifted, parts_of
 from syncline_design.choice.platform_fixes import platform_fixes
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import Problem, RoleTable, VehicleTable
@@ -144,12 +144,14 @@ def _proven(source: Callable[[], Iterable[Found]]) -> list[Found]:
     return found
 
 
-def _each_suffices(case: Case, problem: Problem, build: Build, conflict: Sequence[Part]) -> bool:
+def _each_suffices(
+    case: Case, problem: Problem, build: Build, conflict: Sequence[ConflictPart]
+) -> bool:
     """Whether the spec has a design without any one requirement of the conflict, as it would be
     written: another requirement of the kind stays, and without a sync requirement 1.0 is implied.
     """
 
-    def helps(part: Part) -> bool:
+    def helps(part: ConflictPart) -> bool:
         if part.id is None:
             return is_feasible(lifted(problem, [part]))
         rest = [one for one in case.spec.requirements if one.id != part.id]
@@ -161,9 +163,11 @@ def _each_suffices(case: Case, problem: Problem, build: Build, conflict: Sequenc
         return False
 
 
-def _further(problem: Problem, first: tuple[Part, ...]) -> tuple[tuple[Part, ...], ...]:
+def _further(
+    problem: Problem, first: tuple[ConflictPart, ...]
+) -> tuple[tuple[ConflictPart, ...], ...]:
     """Conflicts that remain, one after the other, once those before them are lifted."""
-    found: list[tuple[Part, ...]] = []
+    found: list[tuple[ConflictPart, ...]] = []
     gone = list(first)
     while gone:
         rest = lifted(problem, gone)
@@ -208,7 +212,7 @@ def _clock_gap(vehicle: VehicleTable) -> RoleGap:
     return RoleGap(vehicle.name, "clock", None, None, text)
 
 
-def conflict_of(problem: Problem) -> tuple[tuple[Part, ...], bool]:
+def conflict_of(problem: Problem) -> tuple[tuple[ConflictPart, ...], bool]:
     """A set of requirements that cannot hold together, none of which can be left out."""
     every = parts_of(problem)
     active = list(every)
@@ -229,11 +233,11 @@ def conflict_of(problem: Problem) -> tuple[tuple[Part, ...], bool]:
     return tuple(active), minimal
 
 
-def _members(case: Case, parts: Iterable[Part]) -> Members:
+def _members(case: Case, parts: Iterable[ConflictPart]) -> Members:
     return tuple(_member(case, part) for part in parts)
 
 
-def _member(case: Case, part: Part) -> ConflictMember:
+def _member(case: Case, part: ConflictPart) -> ConflictMember:
     line = None
     for index, requirement in enumerate(case.spec.requirements):
         if requirement.id == part.id:

@@ -62,7 +62,7 @@ class FamilyPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class SummedDesign:
     """A design with its sums."""
 
     design: FamilyDesign
@@ -121,18 +121,18 @@ def _step_by_step(
         tables = replace(tables, accuracy=np.minimum(limits, cap))
 
 
-def _point(tables: FamilyTables, one: Found) -> FamilyPoint:
+def _point(tables: FamilyTables, one: SummedDesign) -> FamilyPoint:
     amount = one.sums.amount(tables.names[0])
     assert amount is not None
     return FamilyPoint(amount, one.sums.error_m, one.design)
 
 
-def best_of_family(family: Family) -> Found | None:
+def best_of_family(family: Family) -> SummedDesign | None:
     """The first design in the order; None where no design meets every requirement."""
     return next(iter_family(family), None)
 
 
-def iter_family(family: Family, also: Also | None = None) -> Iterator[Found]:
+def iter_family(family: Family, also: Also | None = None) -> Iterator[SummedDesign]:
     """Designs that meet every requirement, best first, each decided exactly.
 
     also: what a design has to satisfy besides; one that does not is passed over.
@@ -143,7 +143,7 @@ def iter_family(family: Family, also: Also | None = None) -> Iterator[Found]:
 
 def iter_differing(
     family: Family, groups: Sequence[Indices], also: Also | None = None
-) -> Iterator[Found]:
+) -> Iterator[SummedDesign]:
     """The best design of each choice of groups of ways (their sensors), best first.
 
     groups: of each role the group of every way.  Each part without the groups of the design that
@@ -152,7 +152,7 @@ def iter_differing(
     if family.is_empty:
         return
     counter = itertools.count()
-    heap: list[tuple[FamilyRank, int, FamilyTables, Found]] = []
+    heap: list[tuple[FamilyRank, int, FamilyTables, SummedDesign]] = []
 
     def push(part: FamilyTables) -> None:
         found = next(_iter(part, also, accuracy=True), None)
@@ -172,13 +172,13 @@ def iter_differing(
             part = replace(part, roles=(*part.roles[:r], own.take(same), *part.roles[r + 1 :]))
 
 
-def _iter(tables: FamilyTables, also: Also | None, *, accuracy: bool) -> Iterator[Found]:
+def _iter(tables: FamilyTables, also: Also | None, *, accuracy: bool) -> Iterator[SummedDesign]:
     """Designs in order: each part of the family without those found is solved anew.
 
     (E. L. Lawler, A procedure for computing the K best solutions, Management Science 18, 1972.)
     """
     counter = itertools.count()
-    heap: list[tuple[FamilyRank, int, FamilyTables, Found]] = []
+    heap: list[tuple[FamilyRank, int, FamilyTables, SummedDesign]] = []
 
     def push(part: FamilyTables) -> None:
         found = _best_in(part, accuracy)
@@ -215,7 +215,7 @@ def _without(part: FamilyTables, design: FamilyDesign) -> Iterator[FamilyTables]
         part = replace(part, clocks=(*part.clocks[:v], (clock,), *part.clocks[v + 1 :]))
 
 
-def _best_in(tables: FamilyTables, accuracy: bool) -> Found | None:
+def _best_in(tables: FamilyTables, accuracy: bool) -> SummedDesign | None:
     """The first design of a part by the sums that merging decides, the sync limit where it can."""
     first = _first(tables, _merged(tables, guarded=False, least=True))
     if first is None or not broken_by_family(tables.family, first.sums, accuracy=accuracy):
@@ -229,16 +229,16 @@ def _best_in(tables: FamilyTables, accuracy: bool) -> Found | None:
     return _first(tables, found, accuracy=accuracy)
 
 
-def _found(tables: FamilyTables, design: FamilyDesign) -> Found:
+def _found(tables: FamilyTables, design: FamilyDesign) -> SummedDesign:
     sums = evaluate_family(tables.family, design)
-    return Found(design, sums, rank_of(tables.family, design, sums))
+    return SummedDesign(design, sums, rank_of(tables.family, design, sums))
 
 
 def _first(
     tables: FamilyTables, parts: Sequence[Complete], accuracy: bool | None = None
-) -> Found | None:
+) -> SummedDesign | None:
     """The first of complete designs in the order; accuracy: only those that keep the sync limit."""
-    best: Found | None = None
+    best: SummedDesign | None = None
     by_error = tables.family.objective == "error"
     everything = [
         (float(total), int(amount), part, row)
@@ -261,7 +261,7 @@ def _first(
     return best
 
 
-def _is_later(tables: FamilyTables, best: Found, first: float, second: float) -> bool:
+def _is_later(tables: FamilyTables, best: SummedDesign, first: float, second: float) -> bool:
     """Whether what has these figures comes after the best for certain."""
     error = best.sums.error_m * (1.0 + APART)
     if tables.family.objective == "error":
@@ -272,8 +272,8 @@ def _is_later(tables: FamilyTables, best: Found, first: float, second: float) ->
 
 
 def _front_of(
-    tables: FamilyTables, parts: Sequence[Complete], known: Sequence[Found] = ()
-) -> list[Found]:
+    tables: FamilyTables, parts: Sequence[Complete], known: Sequence[SummedDesign] = ()
+) -> list[SummedDesign]:
     """The front of complete designs, exact where floats do not tell; known: more of them."""
     lowest, candidates = math.inf, list(known)
     for _, total, part, row in sorted(_rows(parts), key=lambda entry: entry[:2]):
@@ -282,10 +282,10 @@ def _front_of(
         one = _found(tables, part.designs(np.array([row]))[0])
         lowest = min(lowest, total)
         candidates.append(one)
-    out: list[Found] = []
+    out: list[SummedDesign] = []
     name = tables.names[0]
 
-    def order(one: Found) -> tuple[Fraction | float, float, FamilyRank]:
+    def order(one: SummedDesign) -> tuple[Fraction | float, float, FamilyRank]:
         return known_or_more(one.sums.amount(name)), error_key(one.sums.error_m), one.rank
 
     for one in sorted(candidates, key=order):
@@ -306,7 +306,7 @@ def _rows(parts: Sequence[Complete]) -> list[tuple[float, float, Complete, int]]
 
 
 def _merged(
-    tables: FamilyTables, *, guarded: bool, least: bool, known: Sequence[Found] = ()
+    tables: FamilyTables, *, guarded: bool, least: bool, known: Sequence[SummedDesign] = ()
 ) -> list[Complete]:
     """Complete designs that may be on the front, or (`least`) the first in the order.
 
@@ -372,7 +372,7 @@ def _worth_keeping(
     return tuple(roles)
 
 
-def _ceiling_of(tables: FamilyTables, known: Sequence[Found]) -> Ceiling | None:
+def _ceiling_of(tables: FamilyTables, known: Sequence[SummedDesign]) -> Ceiling | None:
     """What designs leave to others."""
     if not known:
         return None

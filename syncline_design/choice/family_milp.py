@@ -23,7 +23,14 @@ from syncline_design.choice.family import (
 )
 from syncline_design.choice.family_best import primary_of
 from syncline_design.choice.family_tables import clock_of, tabulate_family
-from syncline_design.choice.milp import ERROR_STEPS, MOST_CUTS, Model, Solver, Variables, best_of
+from syncline_design.choice.milp import (
+    ERROR_STEPS,
+    MOST_CUTS,
+    MilpModel,
+    Solver,
+    Variables,
+    best_of,
+)
 from syncline_design.choice.options import Indices
 from syncline_design.choice.outcome import Deadline, NoVerdict, TooLarge
 from syncline_design.choice.table import Problem
@@ -68,7 +75,7 @@ class _FamilyModel:
         self.rows: list[Any] = [cp.sum(one) == 1 for one in (*self.x, *self.c)]
         self.rows += [units >= 0 for units in self.units.values()]
         self.missions = [
-            Model(problem, cp, deadline, self._seen_by(m))
+            MilpModel(problem, cp, deadline, self._seen_by(m))
             for m, problem in enumerate(family.problems)
         ]
         for mission in self.missions:

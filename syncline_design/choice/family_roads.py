@@ -25,7 +25,7 @@ from syncline_design.choice.family_best import (
     APART,
     Also,
     FamilyPoint,
-    Found,
+    SummedDesign,
     best_of_family,
     family_front,
     iter_family,
@@ -47,7 +47,7 @@ MOST_ENUMERATED = 20_000  # combinations of which a front is worked out one by o
 class FamilyChoice:
     """The best design of a family, None where there is none, and how that was proven."""
 
-    found: Found | None
+    found: SummedDesign | None
     proof: Proof
 
 
@@ -94,10 +94,10 @@ def _by_milp(family: Family, *, confirm: bool) -> FamilyChoice:
     return _proven(family, _agreed(family, found, other, "the MILP", "merging"), "milp", "front")
 
 
-def _enumerated(family: Family) -> Found | None:
+def _enumerated(family: Family) -> SummedDesign | None:
     """The first design of all, one by one."""
     demand_few(family.combinations)
-    best: Found | None = None
+    best: SummedDesign | None = None
     for one in all_of_family(family):
         if best is not None and one.rank >= best.rank:
             continue
@@ -106,7 +106,7 @@ def _enumerated(family: Family) -> Found | None:
     return best
 
 
-def all_of_family(family: Family) -> Iterator[Found]:
+def all_of_family(family: Family) -> Iterator[SummedDesign]:
     """Every design with its sums, whatever it breaks, one by one."""
     clocks = [range(int(own.shape[1])) for own in family.clocks]
     for ways in itertools.product(*(range(len(role)) for role in family.roles)):
@@ -178,20 +178,20 @@ def _capped(problem: Problem, resource: ResourceName, cap: float, accuracy: bool
     return replace(problem, limits=limits, objective=resource)
 
 
-def _found(family: Family, design: FamilyDesign) -> Found:
+def _found(family: Family, design: FamilyDesign) -> SummedDesign:
     sums = evaluate_family(family, design)
-    return Found(design, sums, rank_of(family, design, sums))
+    return SummedDesign(design, sums, rank_of(family, design, sums))
 
 
-def _proven(family: Family, found: Found | None, road: str, *agrees: str) -> FamilyChoice:
+def _proven(family: Family, found: SummedDesign | None, road: str, *agrees: str) -> FamilyChoice:
     if found is not None and broken_by_family(family, found.sums):
         raise NoVerdict(f"the payload found by {road} does not stand up to the exact recheck")
     return FamilyChoice(found, Proof(road, True, True, agrees_with=agrees))
 
 
 def _agreed(
-    family: Family, one: Found | None, other: Found | None, first: str, second: str
-) -> Found | None:
+    family: Family, one: SummedDesign | None, other: SummedDesign | None, first: str, second: str
+) -> SummedDesign | None:
     """What two roads found, the earlier in the order; NoVerdict where they do not agree."""
     if (one is None) != (other is None):
         raise NoVerdict(f"{first} and {second} disagree on whether any payload meets every mission")
@@ -207,10 +207,10 @@ def _agreed(
 
 
 @dataclass(frozen=True, slots=True)
-class InHand:
+class FamilyInHand:
     """A design that meets every requirement, and what none can go below in the objective."""
 
-    found: Found
+    found: SummedDesign
     bound: Fraction | float
 
     def proof(self, family: Family, road: str) -> Proof:
@@ -222,13 +222,13 @@ class InHand:
         return Proof(road, optimal=False, rechecked=True, gap=max(0.0, gap))
 
 
-def in_hand(family: Family, also: Also | None = None) -> InHand | None:
+def in_hand(family: Family, also: Also | None = None) -> FamilyInHand | None:
     """A quick design, for a time limit that ends the search; None without a limit, or if there is
     none.  also: what it has to satisfy besides."""
     left = in_force().left_s()
     if left is None or family.is_empty:
         return None
-    best: Found | None = None
+    best: SummedDesign | None = None
     for count in FEW:
         try:
             with within_s(SHARE * (in_force().left_s() or 0.0)):
@@ -237,10 +237,10 @@ def in_hand(family: Family, also: Also | None = None) -> InHand | None:
             break
         if one is not None and (best is None or one.rank < best.rank):
             best = one
-    return None if best is None else InHand(best, _bound(family))
+    return None if best is None else FamilyInHand(best, _bound(family))
 
 
-def _among_few(family: Family, count: int, also: Also | None) -> Found | None:
+def _among_few(family: Family, count: int, also: Also | None) -> SummedDesign | None:
     """The best design of those with a few ways of each role."""
     tables = tabulate_family(family, primary_of(family))
     places = [few(tables, r, count) for r in range(len(family.roles))]

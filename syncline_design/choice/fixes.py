@@ -11,7 +11,14 @@ from dataclasses import replace
 from fractions import Fraction
 
 from syncline_design.choice.outcome import Fix, NoVerdict
-from syncline_design.choice.parts import SIMULATED, Part, is_feasible, least, parts_of, solve
+from syncline_design.choice.parts import (
+    SIMULATED,
+    ConflictPart,
+    is_feasible,
+    least,
+    parts_of,
+    solve,
+)
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build, with_methods
 from syncline_design.choice.written import in_unit_of, money, plain
@@ -49,7 +56,7 @@ def requirement_fixes(case: Case, problem: Problem, build: Build) -> Iterator[tu
 
 
 def proven(
-    case: Case, problem: Problem, build: Build, values: Mapping[Part, Fraction]
+    case: Case, problem: Problem, build: Build, values: Mapping[ConflictPart, Fraction]
 ) -> tuple[Fix, ...] | None:
     """The changes that bring limits to these values, if the spec so written has a design."""
     for attempt in range(TRIES):
@@ -65,7 +72,7 @@ def proven(
     return None
 
 
-def as_written(case: Case, problem: Problem, part: Part, value: Fraction) -> Fraction:
+def as_written(case: Case, problem: Problem, part: ConflictPart, value: Fraction) -> Fraction:
     """The limit that a value becomes once it is written with so many figures."""
     afters = [after for _, _, after in moves_to(case, problem, part, value)]
     if part.kind == "cost":
@@ -73,11 +80,11 @@ def as_written(case: Case, problem: Problem, part: Part, value: Fraction) -> Fra
     return min((after.exact for after in afters), default=value)
 
 
-def _widened(part: Part, value: Fraction, attempt: int) -> Fraction:
+def _widened(part: ConflictPart, value: Fraction, attempt: int) -> Fraction:
     return value * (1 + attempt * WIDENING) if part.kind == SIMULATED else value
 
 
-def moves_to(case: Case, problem: Problem, part: Part, value: Fraction) -> Iterator[Move]:
+def moves_to(case: Case, problem: Problem, part: ConflictPart, value: Fraction) -> Iterator[Move]:
     """Requirements whose limit has to move for the kind's to reach a value, and where to."""
     if part.kind == "sync" and part.id is None:
         yield None, problem.limits.sync, plain(value, up=True)
@@ -90,7 +97,7 @@ def moves_to(case: Case, problem: Problem, part: Part, value: Fraction) -> Itera
             yield requirement, float(before), _rounded_up(case, requirement, value)
 
 
-def _is_of(requirement: Requirement, part: Part) -> bool:
+def _is_of(requirement: Requirement, part: ConflictPart) -> bool:
     """Whether a requirement belongs to a part: to a kind of sums, or by its id."""
     if part.kind == SIMULATED:
         return requirement.id == part.id

@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from syncline_design.choice.fixes import as_written, proven
 from syncline_design.choice.outcome import Fix, NoVerdict
-from syncline_design.choice.parts import Part, is_feasible, least, lifted, moved, parts_of
+from syncline_design.choice.parts import ConflictPart, is_feasible, least, lifted, moved, parts_of
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build
 from syncline_design.spec.case import Case
@@ -38,7 +38,7 @@ def joint_fixes(case: Case, problem: Problem, build: Build) -> tuple[tuple[Fix, 
     return tuple(found)
 
 
-def _sets(problem: Problem) -> Iterator[tuple[Part, ...]]:
+def _sets(problem: Problem) -> Iterator[tuple[ConflictPart, ...]]:
     """Sets of requirements whose lifting makes a design exist, of the least size that does."""
     parts = parts_of(problem)
     for size in range(2, len(parts) + 1):
@@ -56,9 +56,9 @@ def _sets(problem: Problem) -> Iterator[tuple[Part, ...]]:
 
 
 def _least_in_turn(
-    case: Case, problem: Problem, order: tuple[Part, ...]
-) -> dict[Part, Fraction] | None:
-    values: dict[Part, Fraction] = {}
+    case: Case, problem: Problem, order: tuple[ConflictPart, ...]
+) -> dict[ConflictPart, Fraction] | None:
+    values: dict[ConflictPart, Fraction] = {}
     for place, part in enumerate(order):
         eased = lifted(moved(problem, _floats(values)), order[place + 1 :])
         value = least(eased, part)
@@ -68,7 +68,7 @@ def _least_in_turn(
     return values
 
 
-def _floats(values: dict[Part, Fraction]) -> dict[Part, Fraction | float]:
+def _floats(values: dict[ConflictPart, Fraction]) -> dict[ConflictPart, Fraction | float]:
     """Limits as the problem holds them: budgets exact, the others as floats."""
     exact = ("cost", "mass", "power")
     return {p: v if p.kind in exact else float(v) for p, v in values.items()}

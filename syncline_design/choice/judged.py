@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from syncline_design.choice.table import Design, Judgement, Problem
+from syncline_design.choice.table import Design, Problem, SimulatedJudgement
 
-NOTHING_SIMULATED = Judgement()
+NOTHING_SIMULATED = SimulatedJudgement()
 
 
-def judgement(problem: Problem, design: Design) -> Judgement:
+def judgement(problem: Problem, design: Design) -> SimulatedJudgement:
     """What simulation says of a design."""
     return NOTHING_SIMULATED if problem.judge is None else problem.judge.judge(problem, design)
 

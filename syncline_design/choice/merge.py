@@ -18,7 +18,7 @@ from syncline_design.choice.labels import NOT_MET, Addition, Labels, concatenate
 from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline
 from syncline_design.choice.pareto import Columns, Guard, undominated
-from syncline_design.choice.remaining import Ceiling, Remaining, StageRoles, lowered, stage_roles
+from syncline_design.choice.remaining import Ceiling, StageRoles, StillToCome, lowered, stage_roles
 from syncline_design.choice.safety import Safety, TimingClass
 from syncline_design.choice.stairs import Stairs
 from syncline_design.choice.table import ClockOption, VehicleTable
@@ -56,7 +56,7 @@ class Merge:
         self.per_sensor = self.problem.sync_model == "per_sensor"
         self.accuracy_m = self.problem.limits.accuracy_m if accuracy else None
         self.offsets = tuple(max(c.offset_bound_s for c in clocks) for clocks in self.clocks)
-        self.after = Remaining(tables, self.stages, self.clocks)
+        self.after = StillToCome(tables, self.stages, self.clocks)
         self.safety = Safety(tables, self.offsets) if guarded else None
         self.capacity = _most_channels(tables)
 

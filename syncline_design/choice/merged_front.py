@@ -26,7 +26,7 @@ import numpy as np
 
 from syncline_design.choice.arrays import Tables, tabulate, tie_order, useful_options
 from syncline_design.choice.evaluate import (
-    Known,
+    Incumbent,
     Rank,
     error_key,
     evaluate,
@@ -69,7 +69,7 @@ def merged_front(
     *,
     accuracy: bool,
     deadline: Deadline | None = None,
-    known: Known | None = None,
+    known: Incumbent | None = None,
 ) -> Sequence[FrontPoint]:
     """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12).
 
@@ -84,7 +84,7 @@ def merged_front(
 
 
 def _merged(
-    problem: Problem, resource: ResourceName, accuracy: bool, end: Deadline, known: Known | None
+    problem: Problem, resource: ResourceName, accuracy: bool, end: Deadline, known: Incumbent | None
 ) -> Sequence[FrontPoint]:
     tables = _one_timeline(tabulate(problem, resource))
     ceiling = None if known is None else _no_worse(tables, known)
@@ -102,7 +102,7 @@ def _merged(
     return _points(tables, parts) if parts else ()
 
 
-def _no_worse(tables: Tables, known: Known) -> Ceiling:
+def _no_worse(tables: Tables, known: Incumbent) -> Ceiling:
     """What leaves nothing that comes after a known design, by objective and error."""
     total = known.total_m * (1.0 + APART)
     if tables.problem.objective == "error":

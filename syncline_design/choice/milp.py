@@ -47,7 +47,7 @@ def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
         return None
     solver = Solver(deadline)
     solver.demand_canary()
-    model = Model(problem, solver.cp, deadline)
+    model = MilpModel(problem, solver.cp, deadline)
     if problem.objective == "error":
         return model.solve(solver, model.objective())
     resource = problem.objective
@@ -163,7 +163,7 @@ class Variables:
 
 
 @dataclass
-class Model:
+class MilpModel:
     """Variables and rows of one problem.
 
     shared: of a mission, its variables by those of its family, which holds the budgets as well.

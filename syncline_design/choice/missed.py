@@ -8,7 +8,7 @@ from fractions import Fraction
 
 from syncline_design.choice.explain import conflict_of, listed
 from syncline_design.choice.outcome import NoVerdict
-from syncline_design.choice.parts import FIELDS, SIMULATED, Part, least, parts_of
+from syncline_design.choice.parts import FIELDS, SIMULATED, ConflictPart, least, parts_of
 from syncline_design.choice.table import Problem
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_quantity
@@ -48,7 +48,7 @@ def nearest_miss(case: Case, problems: Iterable[Problem]) -> Missed:
     return Missed(part.kind, float(value), float(limit), text)
 
 
-def _misses(problem: Problem) -> Iterator[tuple[Fraction, Part, Fraction, Fraction]]:
+def _misses(problem: Problem) -> Iterator[tuple[Fraction, ConflictPart, Fraction, Fraction]]:
     """Every requirement that alone stands in the way: value over limit, it, value and limit."""
     for part in parts_of(problem):
         limit = _limit_of(problem, part)
@@ -57,10 +57,10 @@ def _misses(problem: Problem) -> Iterator[tuple[Fraction, Part, Fraction, Fracti
         with suppress(NoVerdict):  # what cannot be proven is not said
             value = least(problem, part)
             if value is not None:
-                yield value / limit, Part(part.kind, part.id or ""), value, limit
+                yield value / limit, ConflictPart(part.kind, part.id or ""), value, limit
 
 
-def _limit_of(problem: Problem, part: Part) -> Fraction | None:
+def _limit_of(problem: Problem, part: ConflictPart) -> Fraction | None:
     limit = getattr(problem.limits, FIELDS.get(part.kind, part.kind), None)
     return None if limit is None else Fraction(limit)
 

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from syncline_design.choice.evaluate import Known, Rank, broken, evaluate, rank, resource_of
+from syncline_design.choice.evaluate import Incumbent, Rank, broken, evaluate, rank, resource_of
 from syncline_design.choice.merged_front import merged_front
 from syncline_design.choice.narrowed import Narrowed, narrowed
 from syncline_design.choice.options import Indices
@@ -66,7 +66,7 @@ def iter_differing(
             put(rest)
 
 
-def best_of(part: Narrowed, deadline: Deadline, known: Known | None = None) -> Design | None:
+def best_of(part: Narrowed, deadline: Deadline, known: Incumbent | None = None) -> Design | None:
     """The first design of a part in the documented order, by merging, decided exactly.
 
     known: a design of the whole that is in the part: none worse is looked at.

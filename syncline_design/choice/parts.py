@@ -23,7 +23,7 @@ LARGEST_RATIO = 1e12
 MOST_TRIED = 60  # designs simulated for the least limit of a simulated requirement
 
 
-class Part(NamedTuple):
+class ConflictPart(NamedTuple):
     """What a conflict is made of: a kind of sums at its tightest limit, or a simulated quantile.
 
     id: of the requirement that sets the limit; None for the implied sync limit.
@@ -33,12 +33,14 @@ class Part(NamedTuple):
     id: str | None
 
 
-def parts_of(problem: Problem) -> tuple[Part, ...]:
+def parts_of(problem: Problem) -> tuple[ConflictPart, ...]:
     """Every requirement in force, the tightest of each kind of sum."""
     names = dict(problem.limits.ids)
-    found = [Part(kind, names.get(kind)) for kind in KINDS if _is_active(problem.limits, kind)]
+    found = [
+        ConflictPart(kind, names.get(kind)) for kind in KINDS if _is_active(problem.limits, kind)
+    ]
     if problem.judge is not None:
-        found += [Part(SIMULATED, name) for name, _ in problem.judge.limits]
+        found += [ConflictPart(SIMULATED, name) for name, _ in problem.judge.limits]
     return tuple(found)
 
 
@@ -48,12 +50,12 @@ def _is_active(limits: Limits, kind: str) -> bool:
     return getattr(limits, FIELDS.get(kind, kind)) is not None
 
 
-def lifted(problem: Problem, parts: Iterable[Part]) -> Problem:
+def lifted(problem: Problem, parts: Iterable[ConflictPart]) -> Problem:
     """The problem without some of its requirements."""
     return moved(problem, {part: math.inf if part.kind == "sync" else None for part in parts})
 
 
-def moved(problem: Problem, limits: Mapping[Part, Any]) -> Problem:
+def moved(problem: Problem, limits: Mapping[ConflictPart, Any]) -> Problem:
     """The problem with other limits; None lifts a requirement, infinity the sync one."""
     changes: dict[str, Any] = {}
     for part, value in limits.items():
@@ -79,7 +81,7 @@ def is_feasible(problem: Problem) -> bool:
     return solve(problem) is not None
 
 
-def least(problem: Problem, part: Part) -> Fraction | None:
+def least(problem: Problem, part: ConflictPart) -> Fraction | None:
     """The least limit of one requirement at which some design meets all; None: at none.
 
     Sums exactly; sync to 1e-4; a simulated quantile as near as its samples tell, over the designs
@@ -100,7 +102,7 @@ def least(problem: Problem, part: Part) -> Fraction | None:
     return Fraction(best.error_m) if objective == "error" else best.amount(objective)
 
 
-def _least_sync(problem: Problem, part: Part) -> Fraction | None:
+def _least_sync(problem: Problem, part: ConflictPart) -> Fraction | None:
     def holds(limit: float) -> bool:
         return is_feasible(moved(problem, {part: limit}))
 
@@ -122,7 +124,7 @@ def _least_sync(problem: Problem, part: Part) -> Fraction | None:
     return Fraction(works)
 
 
-def _least_spacing(problem: Problem, part: Part) -> Fraction | None:
+def _least_spacing(problem: Problem, part: ConflictPart) -> Fraction | None:
     """The least of the spacings that there are which leaves a design."""
     apart = {
         option.spacing_m(table.speed_mps, table.distance_m)
@@ -140,7 +142,7 @@ def _least_spacing(problem: Problem, part: Part) -> Fraction | None:
     return tried[first] if first < len(tried) else None
 
 
-def _least_simulated(problem: Problem, part: Part) -> Fraction | None:
+def _least_simulated(problem: Problem, part: ConflictPart) -> Fraction | None:
     assert problem.judge is not None
     assert part.id is not None
     rest = replace(lifted(problem, [part]), objective="error")

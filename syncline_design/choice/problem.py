@@ -14,8 +14,8 @@ from fractions import Fraction
 from syncline_design.choice.candidates import (
     NO_SENSOR,
     BySensor,
-    Motion,
     SensorEffects,
+    StageMotion,
     candidates,
     motion_of,
 )
@@ -38,7 +38,7 @@ from syncline_design.choice.table import (
 )
 from syncline_design.model.known import NOTHING_KNOWN, Known
 from syncline_design.spec.barred import barred_clock
-from syncline_design.spec.case import Candidate, Case, RoleCase, StageCase
+from syncline_design.spec.case import CandidateEntry, Case, RoleCase, StageCase
 from syncline_design.spec.catalog import ClockEntry
 from syncline_design.spec.exact import fraction_of, tau_bound
 from syncline_design.spec.selection import ClockSelection, RoleSelection, Selection
@@ -78,7 +78,7 @@ def build_problem(
     return with_motions(problem, motions)
 
 
-def with_motions(problem: Problem, motions: Sequence[Motion]) -> Problem:
+def with_motions(problem: Problem, motions: Sequence[StageMotion]) -> Problem:
     """The problem with the rates at which its stages move."""
     rate = sum((motion.rate for motion in motions), Fraction(0))
     pairs = _pairs(problem.roles, motions)
@@ -155,7 +155,7 @@ def _role_table(
     return found.table(vehicles.index(stage.choice.vehicle_name), limits)
 
 
-def _pairs(tables: tuple[RoleTable, ...], motions: Sequence[Motion]) -> tuple[Pair, ...]:
+def _pairs(tables: tuple[RoleTable, ...], motions: Sequence[StageMotion]) -> tuple[Pair, ...]:
     """Pairs of timestamps that meet: (position, ranging) and (attitude, ranging) of each stage."""
     place = {(table.stage, table.role): r for r, table in enumerate(tables)}
     pairs = []
@@ -187,7 +187,7 @@ def _vehicle(case: Case, name: str) -> VehicleTable:
     return VehicleTable(name, tuple(stages), tuple(clocks), tuple(excluded))
 
 
-def _clock(case: Case, clock: Candidate[ClockEntry]) -> ClockOption:
+def _clock(case: Case, clock: CandidateEntry[ClockEntry]) -> ClockOption:
     entry = clock.entry
     offset = tau_bound(entry.offset, case.spec.coverage_factor)
     if entry.drift is not None and entry.holdover is not None:

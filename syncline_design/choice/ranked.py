@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from syncline_design.choice.best_first import Search, iter_first
+from syncline_design.choice.best_first import BestFirstSearch, iter_first
 from syncline_design.choice.outcome import Deadline, TooLarge
 from syncline_design.choice.partition import iter_differing
 from syncline_design.choice.table import Design, Problem, is_empty
@@ -40,7 +40,7 @@ def iter_best(
     seen: set[Design] = set()
     try:
         patience = CUT_PATIENCE if cuts else PATIENCE
-        for design in Search(problem, cuts=cuts).run(end, patience, patient=True):
+        for design in BestFirstSearch(problem, cuts=cuts).run(end, patience, patient=True):
             seen.add(design)
             yield design
     except TooLarge:

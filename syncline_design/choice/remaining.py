@@ -74,7 +74,7 @@ def stage_roles(problem: Problem) -> tuple[StageRoles, ...]:
     return tuple(out)
 
 
-class Remaining:
+class StillToCome:
     """What the roles still to come add at least, after each role."""
 
     def __init__(

@@ -191,7 +191,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class SimulatedJudgement:
     """What simulation says of one design: ids of the requirements it fails or leaves open."""
 
     failed: tuple[str, ...] = ()
@@ -237,7 +237,7 @@ class Judge(Protocol):
         """Sums that rule designs out, as learned so far, those after the first `known`."""
         ...
 
-    def judge(self, problem: Problem, design: Design) -> Judgement:
+    def judge(self, problem: Problem, design: Design) -> SimulatedJudgement:
         """Simulate one design of a problem against every limit."""
         ...
 

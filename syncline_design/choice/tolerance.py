@@ -16,7 +16,7 @@ from typing import Literal
 
 from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
-from syncline_design.choice.evaluate import Known, broken, chosen_options, evaluate
+from syncline_design.choice.evaluate import Incumbent, broken, chosen_options, evaluate
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
@@ -291,7 +291,7 @@ class _Asked:
 
     def worth_trying(self, figures: Sequence[tuple[SheetFigure, Ends]]) -> list[SheetFigure]:
         """The figures without those that cannot change the choice."""
-        known = Known.of(self.problem, self.design)
+        known = Incumbent.of(self.problem, self.design)
         if self.beside is None or known is None:
             return [figure for figure, _ in figures]
         shares: dict[str, float] = {}

@@ -12,14 +12,14 @@ import numpy as np
 from syncline_design.choice.candidates import (
     NO_SENSOR,
     Candidates,
-    Motion,
     SensorEffects,
+    StageMotion,
     candidates,
     motion_of,
     sensor_error,
 )
 from syncline_design.choice.core import Beside, may_improve, total_least
-from syncline_design.choice.evaluate import Known
+from syncline_design.choice.evaluate import Incumbent
 from syncline_design.choice.options import MARGIN, Bools, Floats, Option, Options
 from syncline_design.choice.problem import with_motions
 from syncline_design.choice.table import Design, Problem, RoleTable
@@ -27,7 +27,7 @@ from syncline_design.choice.variations import PlatformFigure, SheetFigure, with_
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Quantity
-from syncline_design.spec.case import Candidate, Case
+from syncline_design.spec.case import CandidateEntry, Case
 from syncline_design.spec.catalog import SensorEntry
 
 
@@ -155,14 +155,14 @@ def numbers_of(case: Case, problem: Problem) -> Numbers:
     ]
 
 
-def candidates_of(case: Case, table: RoleTable) -> tuple[Candidate[SensorEntry], ...]:
+def candidates_of(case: Case, table: RoleTable) -> tuple[CandidateEntry[SensorEntry], ...]:
     """The sensors that may take a role; their places are the numbers in its columns."""
     role = case.stages[table.stage].role(table.role)
     return () if role is None else role.sensors
 
 
 def sensors_that_matter(
-    case: Case, problem: Problem, known: Known, beside: Beside, shares: Mapping[str, float]
+    case: Case, problem: Problem, known: Incumbent, beside: Beside, shares: Mapping[str, float]
 ) -> set[str]:
     """Sensors that may be part of a design no worse than a known one, were their errors smaller.
 
@@ -230,7 +230,7 @@ class Moving:
         return with_motions(replace(problem, roles=roles), motions)
 
 
-def _with_figure(motion: Motion, figure: PlatformFigure, value: Fraction) -> Motion:
+def _with_figure(motion: StageMotion, figure: PlatformFigure, value: Fraction) -> StageMotion:
     if figure == "v_max":
         return replace(motion, speed=value)
     if figure == "omega_max":

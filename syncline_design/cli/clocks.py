@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from syncline_design.clocks.entry import EntryFiles
     from syncline_design.clocks.study import TimingSettings, TimingStudy
     from syncline_design.comparison.clock_meaning import TimingAndSpec
-    from syncline_design.report.write import Target
+    from syncline_design.report.write import OutputTarget
     from syncline_design.spec.case import Case
 
 _SHARE = "a share between 0 and 1, such as 0.95"
@@ -141,7 +141,7 @@ def _told(
     return _Told(study, whole, "EUR" if case is None else case.spec.currency)
 
 
-def _shown(whole: TimingAndSpec, targets: list[Target], quiet: bool) -> int:
+def _shown(whole: TimingAndSpec, targets: list[OutputTarget], quiet: bool) -> int:
     from syncline_design.report.on_timing import on_timing, render_timing
     from syncline_design.report.render_console import console
 

@@ -25,8 +25,8 @@ from syncline_design.report.formats import GEODETIC_FORMATS, PLAN_FORMATS
 
 if TYPE_CHECKING:
     from syncline_design.diagnosis import Diagnosis
-    from syncline_design.planning.wanted import Asked
-    from syncline_design.report.write import Target
+    from syncline_design.planning.wanted import PlanWanted
+    from syncline_design.report.write import OutputTarget
     from syncline_design.spec.case import Case
 
 
@@ -82,13 +82,13 @@ def plan(
     return run.result.exit_code
 
 
-def _asked(separate: tuple[str, str] | None, reach: str | None) -> Asked:
-    from syncline_design.planning.wanted import Asked, Pair, named, reach_of
+def _asked(separate: tuple[str, str] | None, reach: str | None) -> PlanWanted:
+    from syncline_design.planning.wanted import EffectPair, PlanWanted, named, reach_of
 
-    pairs: tuple[Pair, ...] = ()
+    pairs: tuple[EffectPair, ...] = ()
     if separate is not None:
-        pairs = (Pair(named(separate[0], "--separate"), named(separate[1], "--separate")),)
-    return Asked(() if reach is None else reach_of(reach), pairs)
+        pairs = (EffectPair(named(separate[0], "--separate"), named(separate[1], "--separate")),)
+    return PlanWanted(() if reach is None else reach_of(reach), pairs)
 
 
 def _diagnosis(path: Path) -> Diagnosis:
@@ -108,7 +108,7 @@ def _diagnosis(path: Path) -> Diagnosis:
         raise PlanError(f"--diagnosis {path}: cannot read: {error.strerror or error}") from None
 
 
-def _demand_origin(case: Case, targets: Sequence[Target]) -> None:
+def _demand_origin(case: Case, targets: Sequence[OutputTarget]) -> None:
     """Waypoints on the globe need to know where the local frame is."""
     from syncline_design.spec.load import BadInput
     from syncline_design.spec.yaml_text import Flaw

@@ -156,7 +156,7 @@ def catalog_add(
     from datetime import date
 
     from syncline_design.report.catalog_stub import STUB_TYPES, put_in, stub
-    from syncline_design.report.write import Target, write_outputs
+    from syncline_design.report.write import OutputTarget, write_outputs
 
     if kind not in STUB_TYPES:
         refuse(f"syncline-design: --from-template {kind}: expected one of {', '.join(STUB_TYPES)}")
@@ -167,7 +167,7 @@ def catalog_add(
         return 0
     before, sections = _catalog_there(to)
     section, text = stub(kind, day, lambda part, name: name in sections.get(part, {}))
-    write_outputs([(Target("text", str(to)), put_in(before, section, text))])
+    write_outputs([(OutputTarget("text", str(to)), put_in(before, section, text))])
     return 0
 
 

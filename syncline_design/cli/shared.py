@@ -19,7 +19,7 @@ from syncline_design.report import formats
 if TYPE_CHECKING:
     from syncline_design.machine.deadline import Deadline
     from syncline_design.report.document import Document
-    from syncline_design.report.write import Target
+    from syncline_design.report.write import OutputTarget
 
 PAGE_S = 1.0  # what drawing a page takes
 BAD_INPUT, NO_VERDICT, INTERRUPTED = 2, 3, 130
@@ -134,9 +134,9 @@ def _end_quietly() -> None:
 
 def show(text: str) -> None:
     """Print a text that is the whole result."""
-    from syncline_design.report.write import STDOUT, Target, write_outputs
+    from syncline_design.report.write import STDOUT, OutputTarget, write_outputs
 
-    write_outputs([(Target("text", STDOUT), text)])
+    write_outputs([(OutputTarget("text", STDOUT), text)])
 
 
 def refuse_unexpected(error: BaseException) -> NoReturn:
@@ -165,7 +165,7 @@ def output_targets(
     formats: tuple[str, ...],
     reads: Sequence[Path] = (),
     writes: Sequence[Path | None] = (),
-) -> list[Target]:
+) -> list[OutputTarget]:
     """Where results go; refused where one would overwrite a file that the command reads.
 
     reads: files named on the command line; what these name in turn is held against the targets
@@ -202,39 +202,41 @@ def _stem(reads: Sequence[Path]) -> str:
 
 
 def emit(
-    text: str, targets: list[Target], render: Callable[[str], str | bytes], *, quiet: bool,
+    text: str, targets: list[OutputTarget], render: Callable[[str], str | bytes], *, quiet: bool,
     charts: Callable[[], Mapping[str, Document]] = dict,
 ) -> None:  # fmt: skip
     """Write every target, then the text unless something else already claims standard output.
 
     charts: the documents whose charts go into a folder, by what the files' names begin with.
     """
-    from syncline_design.report.write import STDOUT, Target, write_outputs
+    from syncline_design.report.write import STDOUT, OutputTarget, write_outputs
 
-    rendered: list[tuple[Target, str | bytes]] = []
+    rendered: list[tuple[OutputTarget, str | bytes]] = []
     for target in targets:
         if target.format in formats.CHART_FORMATS:
             rendered += _charts(target, charts())
         else:
             rendered.append((target, render(target.format)))
     if text and not quiet and not any(target.path == STDOUT for target in targets):
-        rendered.append((Target("text", STDOUT), without_commands(text)))
+        rendered.append((OutputTarget("text", STDOUT), without_commands(text)))
     write_outputs(rendered)
     for target in targets:
         if not target.named and not quiet:
             say(f"written to {target.path}")
 
 
-def _charts(target: Target, documents: Mapping[str, Document]) -> list[tuple[Target, str | bytes]]:
+def _charts(
+    target: OutputTarget, documents: Mapping[str, Document]
+) -> list[tuple[OutputTarget, str | bytes]]:
     """A target for each chart; the user is told where there is none."""
     from syncline_design.report.rendered import chart_files
-    from syncline_design.report.write import Target
+    from syncline_design.report.write import OutputTarget
 
     found = chart_files(documents, "svg" if target.format == "svg" else "png")
     if not found:
         say(f"{target.path}: nothing written, this result has no chart")
     folder = Path(target.path)
-    return [(Target(target.format, str(folder / name)), content) for name, content in found]
+    return [(OutputTarget(target.format, str(folder / name)), content) for name, content in found]
 
 
 def demand_spec(write_spec: Path | None, spec: Path | None) -> None:
@@ -258,7 +260,7 @@ def deadline_of(time_limit_s: float | None) -> Deadline:
 
 @contextmanager
 def watched(
-    deadline: Deadline, targets: Sequence[Target] = (), *, quiet: bool, steps: bool = True
+    deadline: Deadline, targets: Sequence[OutputTarget] = (), *, quiet: bool, steps: bool = True
 ) -> Iterator[None]:
     """The whole work of a command, its reading included, within its time limit.
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.clocks.series import Series
+from syncline_design.clocks.series import ClockSeries
 from syncline_design.clocks.sessions import ClockSession, is_leap, went_back
 from syncline_design.clocks.times import moment, shown
 from syncline_design.model.figure_text import format_duration, to_digits
@@ -19,7 +19,7 @@ _LARGEST_S, _SMALLEST_S = 0.5, 1e-11
 _THOUSANDS: Final = (1e3, 1e6, 1e9)
 
 
-def doubts(series: Sequence[Series], sessions: Sequence[ClockSession]) -> tuple[str, ...]:
+def doubts(series: Sequence[ClockSeries], sessions: Sequence[ClockSession]) -> tuple[str, ...]:
     """Every doubt as a sentence without its stop."""
     found = [
         *(said for one in series for said in (*_stamps(one), *_summer_time(one))),
@@ -32,7 +32,7 @@ def doubts(series: Sequence[Series], sessions: Sequence[ClockSession]) -> tuple[
     return tuple(dict.fromkeys(found))
 
 
-def _stamps(one: Series) -> Iterator[str]:
+def _stamps(one: ClockSeries) -> Iterator[str]:
     for time_s, back_s in went_back(one):
         hours = back_s / 3600.0
         dst = abs(hours - round(hours)) * 3600.0 < 60.0 and round(hours) in (1, 2)
@@ -41,7 +41,7 @@ def _stamps(one: Series) -> Iterator[str]:
                f"{moment(time_s, one.kind.stamps)}: {why}")  # fmt: skip
 
 
-def _summer_time(one: Series) -> Iterator[str]:
+def _summer_time(one: ClockSeries) -> Iterator[str]:
     """A table whose stamps leave out an hour on a Sunday, as local time does in spring."""
     if one.kind.family != "csv" or one.kind.stamps != "utc":
         return

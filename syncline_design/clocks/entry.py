@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from syncline_design.clocks.files import refused
-from syncline_design.clocks.result import CatalogEntry, EntryKind, Timing
+from syncline_design.clocks.result import CatalogEntry, ClockEntryKind, Timing
 from syncline_design.clocks.study import TimingStudy
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.result_files import write_files
@@ -18,7 +18,7 @@ from syncline_design.model.figure_text import to_digits
 from syncline_design.spec.load import load_builtin
 
 _ID: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,79}")
-_SECTIONS: Final[dict[EntryKind, str]] = {"clock": "clocks", "timestamping": "timestamping"}
+_SECTIONS: Final[dict[ClockEntryKind, str]] = {"clock": "clocks", "timestamping": "timestamping"}
 _MOST_EVENTS: Final = 20
 _MARK: Final = "# Measured by `syncline-design timing`"
 
@@ -68,7 +68,8 @@ def entry_files(identity: str, catalog: Path | None) -> EntryFiles:
 
 
 def with_entry(
-    study: TimingStudy, identity: str, kind: EntryKind, files: EntryFiles, currency: str = "EUR"
+    study: TimingStudy, identity: str, kind: ClockEntryKind, files: EntryFiles,
+    currency: str = "EUR",
 ) -> Timing:  # fmt: skip
     """The result with its entry; nothing is written yet."""
     text = entry_text(study.timing, identity, kind, files.values.name, currency)
@@ -83,7 +84,7 @@ def write_entry(study: TimingStudy, timing: Timing, files: EntryFiles) -> None:
     write_files([(files.values, values.encode()), (files.catalog, timing.entry.text.encode())])
 
 
-def values_text(study: TimingStudy, kind: EntryKind) -> str:
+def values_text(study: TimingStudy, kind: ClockEntryKind) -> str:
     """Quantiles of the error, one a line; of a method mu = -offset (valid at stamp + mu)."""
     meaning = "host minus UTC" if kind == "clock" else "mu: data were valid at their stamp plus mu"
     lines = [f"# {meaning}, quantiles of the steady state, each session with the same weight", "s"]
@@ -91,14 +92,14 @@ def values_text(study: TimingStudy, kind: EntryKind) -> str:
     return "\n".join(lines) + "\n"
 
 
-def values_of(study: TimingStudy, kind: EntryKind) -> list[float]:
+def values_of(study: TimingStudy, kind: ClockEntryKind) -> list[float]:
     """Quantiles of the error [s]: host minus UTC of a clock, mu of a method."""
     sign = 1.0 if kind == "clock" else -1.0
     return sorted((sign * study.offsets_s).tolist())
 
 
 def entry_text(
-    timing: Timing, identity: str, kind: EntryKind, values_file: str, currency: str
+    timing: Timing, identity: str, kind: ClockEntryKind, values_file: str, currency: str
 ) -> str:  # fmt: skip
     """One catalog file with one entry."""
     claim, key = timing.claim, "offset" if kind == "clock" else "error"

@@ -11,7 +11,7 @@ import re
 from dataclasses import field
 from typing import Final
 
-from syncline_design.clocks.series import Row, SourceKind, Stamps, Steering
+from syncline_design.clocks.series import Row, SourceKind, Steering, TimeBase
 from syncline_design.machine.quick_dataclass import dataclass
 
 _PROGRAM: Final = re.compile(r"\b(ptp4l|phc2sys|ts2phc)(?=\[|: )")
@@ -42,7 +42,7 @@ _STEERING: Final[dict[str, Steering]] = {
 
 
 @dataclass(slots=True)
-class Reader:
+class PtpReader:
     """One file; states say between which lines lock was lost or the program began anew."""
 
     began: set[tuple[str, str]] = field(default_factory=set)
@@ -114,6 +114,6 @@ def _kind(key: tuple[str, str], what: str | None, time_s: float) -> SourceKind:
     named = (what or "").strip()
     if program == "ptp4l" or named in ("master", "phc", "sys"):
         named = tag
-    stamps: Stamps = "utc" if time_s >= _UNIX else "boot"
+    stamps: TimeBase = "utc" if time_s >= _UNIX else "boot"
     name = f"{program} {named}".strip()
     return SourceKind(name, "linuxptp", _RANKS[program], _STEERING[program], stamps)

@@ -13,7 +13,7 @@ import numpy as np
 
 from syncline_design.clocks import chrony, columns, linuxptp, ntpd, pulses
 from syncline_design.clocks.files import LogFile, read_files, refused
-from syncline_design.clocks.series import FARTHEST_S, Row, Series, Sheet, SourceKind, series_of
+from syncline_design.clocks.series import FARTHEST_S, ClockSeries, Row, Sheet, SourceKind, series_of
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
@@ -23,7 +23,7 @@ _Read = Callable[[str], tuple[SourceKind, Row, str] | None]
 _LINE_READERS: Final[dict[str, Callable[[], _Read]]] = {
     "chrony": lambda: chrony.row,
     "ntpd": lambda: ntpd.row,
-    "linuxptp": lambda: linuxptp.Reader().row,
+    "linuxptp": lambda: linuxptp.PtpReader().row,
     "gpsd": lambda: pulses.gpsd_row,
     "ppstest": lambda: pulses.ppstest_row,
 }
@@ -41,7 +41,7 @@ MOST_ROWS: Final = 5_000_000
 class ClockLogs:
     """All that was read: series by source, the files, and what has to be said of them."""
 
-    series: tuple[Series, ...]
+    series: tuple[ClockSeries, ...]
     files: tuple[FileRead, ...]
     notes: tuple[str, ...]
 
@@ -166,7 +166,7 @@ def _count(read: Callable[[str], object], lines: Iterable[str]) -> int:
     return sum(read(line) is not None for line in lines)
 
 
-def _joined(parts: list[tuple[LogFile, Sheet]]) -> Series:
+def _joined(parts: list[tuple[LogFile, Sheet]]) -> ClockSeries:
     """Rotations of one log, the oldest first: by their stamps where these are of UTC."""
     kind = parts[0][1].kind
     if kind.stamps == "utc":
@@ -177,7 +177,7 @@ def _joined(parts: list[tuple[LogFile, Sheet]]) -> Series:
     return series_of(kind, files, [sheet for _, sheet in parts])
 
 
-def _demand_once(series: Sequence[Series], files: dict[str, LogFile]) -> None:
+def _demand_once(series: Sequence[ClockSeries], files: dict[str, LogFile]) -> None:
     """Rows of one source in two logs are one session given twice, whole or in part.
 
     Within a log a row that comes back is one too: a rotation and its copy.
@@ -199,13 +199,13 @@ def _demand_once(series: Sequence[Series], files: dict[str, LogFile]) -> None:
                           found="rows with the same stamp and offset", hint=hint)  # fmt: skip
 
 
-def _apart(one: Series, other: Series) -> bool:
+def _apart(one: ClockSeries, other: ClockSeries) -> bool:
     """Whether no stamp of one can be a stamp of the other."""
     return bool(np.min(one.time_s) > np.max(other.time_s)
                 or np.min(other.time_s) > np.max(one.time_s))  # fmt: skip
 
 
-def _free_running(one: Series) -> tuple[Series, str]:
+def _free_running(one: ClockSeries) -> tuple[ClockSeries, str]:
     """A servo that never steered: it only compares, so its offsets are no servo's own."""
     if one.kind.family != "linuxptp" or not len(one) or bool(np.any(one.locked)):
         return one, ""

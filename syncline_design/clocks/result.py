@@ -10,11 +10,11 @@ from typing import Annotated, Final, Literal
 from syncline_design.clocks.sessions import EventKind
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 
 SCHEMA: Final = "syncline-design/timing/v1"
 RestsOn = Literal["independent", "servo", "servo_and_declared", "unknown", "unknown_and_declared"]
-EntryKind = Literal["clock", "timestamping"]
+ClockEntryKind = Literal["clock", "timestamping"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class CatalogEntry(Record):
     """What was written for a catalog; text: the entry as it stands in the file."""
 
     id: str
-    kind: EntryKind
+    kind: ClockEntryKind
     file: str
     values_file: str
     text: str
@@ -135,7 +135,7 @@ class Timing(Record):
     forbids any claim until it is explained.
     """
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     sessions: tuple[SessionResult, ...]
     bound_s: float | None
     event_bound_s: float | None

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from syncline_design.clocks.files import refused
-from syncline_design.clocks.result import EntryKind
-from syncline_design.clocks.series import Series
+from syncline_design.clocks.result import ClockEntryKind
+from syncline_design.clocks.series import ClockSeries
 from syncline_design.clocks.sessions import sessions_of
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -30,11 +30,11 @@ _LINUXPTP_SIGN: Final = "local - reference in the log"
 
 
 @dataclass(frozen=True, slots=True)
-class Selection:
+class SourceSelection:
     """Series of the source that is used, all others, and what has to be said of the choice."""
 
-    used: tuple[Series, ...]
-    others: tuple[Series, ...]
+    used: tuple[ClockSeries, ...]
+    others: tuple[ClockSeries, ...]
     notes: tuple[str, ...]
 
 
@@ -43,7 +43,9 @@ def sign_of(name: str) -> str:
     return next((sign for start, sign in SIGNS.items() if name.startswith(start)), _LINUXPTP_SIGN)
 
 
-def select(series: Sequence[Series], wanted: str | None, kind: EntryKind, first: Path) -> Selection:
+def select(
+    series: Sequence[ClockSeries], wanted: str | None, kind: ClockEntryKind, first: Path
+) -> SourceSelection:
     """The source asked for, or the one that says most of the clock; refused where none does."""
     series = [*series, *_chained(series)]
     names = list(dict.fromkeys(one.kind.name for one in series))
@@ -71,11 +73,11 @@ def select(series: Sequence[Series], wanted: str | None, kind: EntryKind, first:
     return _ranked(usable, series)
 
 
-def _is_serial(one: Series) -> bool:
+def _is_serial(one: ClockSeries) -> bool:
     return one.kind.family == "gpsd" and one.kind.reference == "TOFF"
 
 
-def _ranked(usable: Sequence[Series], series: Sequence[Series]) -> Selection:
+def _ranked(usable: Sequence[ClockSeries], series: Sequence[ClockSeries]) -> SourceSelection:
     usable, notes = _independent_refclocks(usable)
     by_hand = {one.kind.name: one for one in usable}
     best = min(one.kind.rank for one in by_hand.values())
@@ -96,13 +98,13 @@ def _ranked(usable: Sequence[Series], series: Sequence[Series]) -> Selection:
     return _split(series, names[0], tuple(notes))
 
 
-def _level(series: Sequence[Series]) -> float:
+def _level(series: Sequence[ClockSeries]) -> float:
     offsets = np.concatenate([one.offset_s[one.locked] for one in series])
     offsets = offsets[np.isfinite(offsets)]
     return float(np.quantile(np.abs(offsets), 0.95)) if offsets.shape[0] else 0.0
 
 
-def _independent_refclocks(series: Sequence[Series]) -> tuple[list[Series], list[str]]:
+def _independent_refclocks(series: Sequence[ClockSeries]) -> tuple[list[ClockSeries], list[str]]:
     """Reference clocks that the tracking log never names: marked `noselect`, they steer nothing."""
     tracked = [one for one in series if one.kind.name == "chrony tracking"]
     references = frozenset[str]().union(*(one.references for one in tracked))
@@ -120,12 +122,12 @@ def _independent_refclocks(series: Sequence[Series]) -> tuple[list[Series], list
     return found, list(dict.fromkeys(notes))
 
 
-def _split(series: Sequence[Series], name: str, notes: tuple[str, ...]) -> Selection:
+def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> SourceSelection:
     used = tuple(one for one in series if one.kind.name == name)
-    return Selection(used, tuple(one for one in series if one.kind.name != name), notes)
+    return SourceSelection(used, tuple(one for one in series if one.kind.name != name), notes)
 
 
-def _chained(series: Sequence[Series]) -> list[Series]:
+def _chained(series: Sequence[ClockSeries]) -> list[ClockSeries]:
     """The system clock against the reference: phc2sys (system - card) + ptp4l or ts2phc (card -
     reference), where both are there."""
     system = [s for s in series if s.kind.name == "phc2sys CLOCK_REALTIME"]
@@ -140,7 +142,9 @@ def _chained(series: Sequence[Series]) -> list[Series]:
     return []
 
 
-def _pairs(system: Sequence[Series], cards: Sequence[Series]) -> list[tuple[Series, Series]]:
+def _pairs(
+    system: Sequence[ClockSeries], cards: Sequence[ClockSeries]
+) -> list[tuple[ClockSeries, ClockSeries]]:
     """Runs of both that belong together: of one file, or in the order of the files."""
     found = []
     for index, one in enumerate(system):
@@ -154,7 +158,7 @@ def _pairs(system: Sequence[Series], cards: Sequence[Series]) -> list[tuple[Seri
     return found
 
 
-def _sum(system: Series, card: Series) -> Series | None:
+def _sum(system: ClockSeries, card: ClockSeries) -> ClockSeries | None:
     """Offsets and hard bounds added; in lock only where both are, and where the card was heard."""
     known = card.part(np.isfinite(card.offset_s))
     if len(known) < 2:

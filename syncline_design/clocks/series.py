@@ -15,9 +15,9 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Family = Literal["chrony", "ntpd", "linuxptp", "gpsd", "ppstest", "csv"]
+DaemonName = Literal["chrony", "ntpd", "linuxptp", "gpsd", "ppstest", "csv"]
 Steering = Literal["servo", "independent", "unknown"]
-Stamps = Literal["utc", "boot"]
+TimeBase = Literal["utc", "boot"]
 FARTHEST_S: Final = 1e11  # 3 000 years: neither a stamp nor an offset
 
 
@@ -48,10 +48,10 @@ class SourceKind:
     """
 
     name: str
-    family: Family
+    family: DaemonName
     rank: int
     steering: Steering
-    stamps: Stamps
+    stamps: TimeBase
     reference: str = ""
 
 
@@ -75,7 +75,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, slots=True)
-class Series:
+class ClockSeries:
     """Rows of one source of one log (all its rotations), in the order of time."""
 
     kind: SourceKind
@@ -92,9 +92,9 @@ class Series:
     def __len__(self) -> int:
         return int(self.time_s.shape[0])
 
-    def part(self, chosen: slice | Flags) -> Series:
+    def part(self, chosen: slice | Flags) -> ClockSeries:
         """Some of the rows."""
-        return Series(
+        return ClockSeries(
             self.kind, self.files, self.time_s[chosen], self.offset_s[chosen], self.hard_s[chosen],
             self.locked[chosen], self.rate[chosen], self.skew[chosen], self.restart[chosen],
             self.references,
@@ -103,10 +103,11 @@ class Series:
 
 def series_of(
     kind: SourceKind, files: tuple[str, ...], sheets: Sequence[Sheet]
-) -> Series:  # fmt: skip
+) -> ClockSeries:  # fmt: skip
     """Rows of several files as columns."""
     table = np.concatenate([sheet.columns for sheet in sheets])
     references = frozenset[str]().union(*(sheet.references for sheet in sheets))
     time_s, offset_s, hard_s, locked, rate, skew, restart = table.T.copy()
-    return Series(kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5,
-                  references)  # fmt: skip
+    return ClockSeries(
+        kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5, references
+    )  # fmt: skip

@@ -9,7 +9,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.clocks.series import Array, Flags, Series
+from syncline_design.clocks.series import Array, ClockSeries, Flags
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 
@@ -39,7 +39,7 @@ class ClockEvent:
 class ClockSession:
     """One run of the clock, from a start to its end; steady: rows that the bounds are made of."""
 
-    series: Series
+    series: ClockSeries
     steady: Flags
     weight_s: Array
     events: tuple[ClockEvent, ...]
@@ -82,7 +82,7 @@ def weighted_quantile(values: Array, weights: Array, share: float) -> float:
     return float(values[order][min(place, len(values) - 1)])
 
 
-def sessions_of(series: Series, gap_s: float) -> list[ClockSession]:
+def sessions_of(series: ClockSeries, gap_s: float) -> list[ClockSession]:
     """A log cut at restarts, at gaps longer than `gap_s`, and where stamps begin anew."""
     if not len(series):
         return []
@@ -91,19 +91,19 @@ def sessions_of(series: Series, gap_s: float) -> list[ClockSession]:
     return [_session(part) for part in parts]
 
 
-def count_of(series: Series, gap_s: float) -> int:
+def count_of(series: ClockSeries, gap_s: float) -> int:
     """How many sessions there would be."""
     return int(_cuts(series, gap_s).shape[0]) + 1
 
 
-def _cuts(series: Series, gap_s: float) -> NDArray[np.int64]:
+def _cuts(series: ClockSeries, gap_s: float) -> NDArray[np.int64]:
     """The first rows of all sessions but the first."""
     steps = np.diff(series.time_s)
     begun = series.restart[1:] & ~series.restart[:-1]  # several such lines are one start
     return np.flatnonzero((steps > gap_s) | (steps < -1.0) | begun) + 1
 
 
-def went_back(series: Series) -> list[tuple[float, float]]:
+def went_back(series: ClockSeries) -> list[tuple[float, float]]:
     """Where stamps of UTC go back: (stamp before, by how much) [s]."""
     if series.kind.stamps != "utc":
         return []
@@ -111,7 +111,7 @@ def went_back(series: Series) -> list[tuple[float, float]]:
     return [(float(series.time_s[k]), float(-steps[k])) for k in np.flatnonzero(steps < -1.0)]
 
 
-def _session(series: Series) -> ClockSession:
+def _session(series: ClockSeries) -> ClockSession:
     order = np.argsort(series.time_s, kind="stable")
     series = series.part(order) if np.any(np.diff(order) < 0) else series  # type: ignore[arg-type]
     longest = _longest_interval(series.time_s)
@@ -146,7 +146,7 @@ def _weights(time_s: Array, longest: float) -> Array:
     return raised
 
 
-def _startup(series: Series) -> Flags:
+def _startup(series: ClockSeries) -> Flags:
     """The rows before lock is first reached, or before the daemon's own bound has come down."""
     good = series.locked & np.isfinite(series.offset_s)
     hard = series.hard_s[good]
@@ -162,14 +162,14 @@ def _size(offsets: Array) -> float:
     return float(np.max(known)) if known.shape[0] else 0.0
 
 
-def _drifted(series: Series, first: int, last: int) -> float:
+def _drifted(series: ClockSeries, first: int, last: int) -> float:
     """What a clock may have drifted between two rows by the daemon's skew before; 0: unknown."""
     skew = float(series.skew[first])
     span = float(series.time_s[last] - series.time_s[first])
     return skew * span if 0.0 < skew < MOST_SKEW else 0.0
 
 
-def _startup_events(series: Series, startup: Flags) -> list[ClockEvent]:
+def _startup_events(series: ClockSeries, startup: Flags) -> list[ClockEvent]:
     count = int(np.sum(startup))
     if not count:
         return []
@@ -178,7 +178,7 @@ def _startup_events(series: Series, startup: Flags) -> list[ClockEvent]:
                        _size(series.offset_s[:count]))]  # fmt: skip
 
 
-def _lock_events(series: Series, startup: Flags, longest: float) -> list[ClockEvent]:
+def _lock_events(series: ClockSeries, startup: Flags, longest: float) -> list[ClockEvent]:
     """Where lock was lost, what the clock did until it came back, and its offset then."""
     out = ~series.locked & ~startup
     edges = np.flatnonzero(np.diff(np.concatenate([[False], out, [False]]).astype(int)))
@@ -195,7 +195,7 @@ def _lock_events(series: Series, startup: Flags, longest: float) -> list[ClockEv
     return found
 
 
-def _gap_events(series: Series, longest: float) -> list[ClockEvent]:
+def _gap_events(series: ClockSeries, longest: float) -> list[ClockEvent]:
     """Times without samples: the larger offset at the two ends, and what the skew brings."""
     places = np.flatnonzero(np.diff(series.time_s) > longest)
     return [
@@ -205,7 +205,7 @@ def _gap_events(series: Series, longest: float) -> list[ClockEvent]:
     ]  # fmt: skip
 
 
-def _step_events(series: Series, steady: Flags) -> list[ClockEvent]:
+def _step_events(series: ClockSeries, steady: Flags) -> list[ClockEvent]:
     """Jumps from one sample to the next beyond anything that the session's noise does."""
     places = np.flatnonzero(steady)
     if places.shape[0] < LEAST_SAMPLES:
@@ -238,7 +238,7 @@ def is_leap(time_s: float, jump_s: float) -> bool:
     return abs(abs(jump_s) - 1.0) < 0.1 and abs(from_midnight) < 1100.0
 
 
-def _frequency_events(series: Series, steady: Flags) -> list[ClockEvent]:
+def _frequency_events(series: ClockSeries, steady: Flags) -> list[ClockEvent]:
     """Jumps of the frequency correction; the size is what they bring until the next sample."""
     rate, times = series.rate[steady], series.time_s[steady]
     known = np.isfinite(rate)

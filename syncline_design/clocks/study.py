@@ -17,7 +17,7 @@ from syncline_design.clocks.doubts import doubts
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.reading import read_logs
 from syncline_design.clocks.result import (
-    EntryKind,
+    ClockEntryKind,
     EventResult,
     HoldoverPoint,
     RestsOn,
@@ -28,7 +28,7 @@ from syncline_design.clocks.result import (
     TimingClaim,
     TracePoint,
 )
-from syncline_design.clocks.selection import Selection, select, sign_of
+from syncline_design.clocks.selection import SourceSelection, select, sign_of
 from syncline_design.clocks.series import Array
 from syncline_design.clocks.sessions import ClockSession, count_of, sessions_of, weighted_quantile
 from syncline_design.clocks.times import moment
@@ -65,7 +65,7 @@ class TimingSettings:
     source: str | None = None
     independent: bool = False
     use: Use = "larger"
-    kind: EntryKind = "clock"
+    kind: ClockEntryKind = "clock"
     declared: Mapping[str, float] = field(default_factory=dict)
     conditions: str | None = None
 
@@ -153,7 +153,7 @@ def _figures(
 
 
 def _claim(
-    counted: Sequence[ClockSession], chosen: Selection, settings: TimingSettings,
+    counted: Sequence[ClockSession], chosen: SourceSelection, settings: TimingSettings,
     figures: _Figures, doubted: Sequence[str],
 ) -> TimingClaim:  # fmt: skip
     missing = max(0, LEAST_SESSIONS - len(counted))
@@ -182,7 +182,7 @@ def _claim(
     )  # fmt: skip
 
 
-def _rests_on(chosen: Selection, settings: TimingSettings) -> RestsOn:
+def _rests_on(chosen: SourceSelection, settings: TimingSettings) -> RestsOn:
     """Whether the offsets are the servo's own, which nulls them whatever the clock's error is."""
     steering = {one.kind.steering for one in chosen.used}
     if settings.independent or steering == {"independent"}:
@@ -237,7 +237,7 @@ def _events(sessions: Sequence[ClockSession]) -> tuple[EventResult, ...]:
     )  # fmt: skip
 
 
-def _sources(chosen: Selection, settings: TimingSettings) -> tuple[SourceResult, ...]:
+def _sources(chosen: SourceSelection, settings: TimingSettings) -> tuple[SourceResult, ...]:
     names = list(dict.fromkeys(one.kind.name for one in (*chosen.used, *chosen.others)))
     found = []
     for name in names:

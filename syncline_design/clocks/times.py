@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from syncline_design.clocks.series import Stamps
+from syncline_design.clocks.series import TimeBase
 from syncline_design.model.figure_text import format_quantity, to_places
 from syncline_design.model.quantity import Dimension
 
 
-def moment(time_s: float, stamps: Stamps) -> str:
+def moment(time_s: float, stamps: TimeBase) -> str:
     """ISO 8601 in UTC, or seconds since boot where no date is known."""
     if stamps == "boot":
         return f"{to_places(time_s, 3)} s since start"

@@ -7,16 +7,16 @@ from typing import Annotated, Final, Literal
 
 from syncline_design.effects.record import Promise
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.verdict.tree import Word
 
 SCHEMA: Final = "syncline-design/acceptance/v1"
-Status = Literal["holds", "broken", "not_shown"]
+AssumptionStatus = Literal["holds", "broken", "not_shown"]
 AssumptionName = Promise | Literal["speed", "rate"]
 NAMES: Final[tuple[AssumptionName, ...]] = (
     "timing", "latency", "lever_arm", "mounting", "noise", "clock", "speed", "rate",
 )  # fmt: skip
-EXIT_CODES: Final[Mapping[Status, int]] = {"holds": 0, "broken": 1, "not_shown": 3}
+EXIT_CODES: Final[Mapping[AssumptionStatus, int]] = {"holds": 0, "broken": 1, "not_shown": 3}
 ReadAs = Literal["clock", "stamps", "log"]
 
 
@@ -53,7 +53,7 @@ class AssumptionResult(Record):
     assumed: float | None
     measured: MeasuredFigure | None
     unit: str
-    status: Status
+    status: AssumptionStatus
     evidence: str
     line: int
     column: int
@@ -89,8 +89,8 @@ class Acceptance(Record):
     broken, `spec` for a spec that fails on paper, else stage/role/assumption.
     """
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
-    verdict: Status
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
+    verdict: AssumptionStatus
     broken_by: tuple[str, ...] = ()
     spec: AcceptedSpec
     asked: tuple[AssumptionName, ...]
@@ -106,7 +106,7 @@ class Acceptance(Record):
         return EXIT_CODES[self.verdict]
 
 
-def worst(statuses: Iterable[Status]) -> Status:
+def worst(statuses: Iterable[AssumptionStatus]) -> AssumptionStatus:
     """Broken before not shown before holds; of none: not shown."""
     found = set(statuses)
     if "broken" in found:

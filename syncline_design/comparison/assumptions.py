@@ -10,6 +10,7 @@ from syncline_design.comparison.stamp_meaning import ARRIVAL
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, StageCase
+from syncline_design.spec.yaml_text import KeyPath
 from syncline_design.verdict.named import NamedDesign, NamedRole
 from syncline_design.verdict.tree import Verdict
 
@@ -21,7 +22,6 @@ _UNITS: Final[dict[AssumptionName, str]] = {
     "timing": "s", "latency": "s", "lever_arm": "m", "mounting": "rad", "noise": "1",
     "clock": "s", "speed": "m/s", "rate": "rad/s",
 }  # fmt: skip
-KeyPath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Final
 
 from syncline_design.clocks.result import Timing
 from syncline_design.clocks.study import TimingStudy
-from syncline_design.comparison.acceptance import MeasuredFigure, Status
+from syncline_design.comparison.acceptance import AssumptionStatus, MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.machine.quick_dataclass import dataclass
@@ -48,7 +48,7 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
         said = f"measured bound {measured}, {times} the {asked} assumed"
         return Judgement("broken", said, figure)
     why = _why_not(one.value, found, resting)
-    status: Status = "not_shown" if why else "holds"
+    status: AssumptionStatus = "not_shown" if why else "holds"
     lead = f"measured bound {measured} within the {asked} assumed"
     return Judgement(status, lead + (why or _rests_on(found)), figure)
 

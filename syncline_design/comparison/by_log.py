@@ -18,7 +18,14 @@ from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.limits import Beyond
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
-from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Motion, Smallest
+from syncline_design.diagnosis.result import (
+    Check,
+    Diagnosis,
+    Estimate,
+    Finding,
+    MotionQuantiles,
+    Smallest,
+)
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
@@ -398,7 +405,7 @@ def _of_platform(one: Assumed, log: LogEvidence) -> Judgement:
 
 
 def _reached(
-    motion: Motion | None, mean: Beyond | None, unit: float
+    motion: MotionQuantiles | None, mean: Beyond | None, unit: float
 ) -> tuple[float, MeasuredFigure]:
     """What 95 % of a log stay below, and the most; of an earlier stage by means over seconds."""
     if motion is None:

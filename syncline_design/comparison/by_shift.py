@@ -24,20 +24,20 @@ LASTING: Final = "latency_s"  # parameter of the effect that is a constant delay
 
 
 @dataclass(frozen=True, slots=True)
-class Shift:
+class StampDelay:
     """The largest delay that one finding of stamps made on this log [s]; None: it says no size."""
 
     finding: Finding
     delay: MeasuredFigure | None
 
 
-def shifts(one: Assumed, found: Diagnosis) -> list[Shift]:
+def shifts(one: Assumed, found: Diagnosis) -> list[StampDelay]:
     """Findings that move a sensor's stamps by what is no scatter; of `latency` rows alone."""
     if one.name != "latency":
         return []
     own = [f for f in found.findings if f.stage == one.stage and _moves(f)]
     whose = [f for f in own if one.role in (f.sensor, *(f.also or ()))]
-    return [Shift(f, _delay(f, found.log.duration_s)) for f in whose]
+    return [StampDelay(f, _delay(f, found.log.duration_s)) for f in whose]
 
 
 def _moves(finding: Finding) -> bool:
@@ -62,7 +62,7 @@ def _scaled(part: Estimate, times: float) -> MeasuredFigure:
     return MeasuredFigure(times * float(part.value), *(ends if len(ends) == 2 else (None, None)))
 
 
-def by_shifts(one: Assumed, moved: Sequence[Shift], paper: OnPaper) -> Judgement | None:
+def by_shifts(one: Assumed, moved: Sequence[StampDelay], paper: OnPaper) -> Judgement | None:
     """Broken by a delay that turns the verdict; not shown beside other material faults of stamps.
 
     None where no stamps were found to run away or step, or that does not matter to the delay.
@@ -71,7 +71,7 @@ def by_shifts(one: Assumed, moved: Sequence[Shift], paper: OnPaper) -> Judgement
     return next((j for j in said if j.status == "broken"), said[0] if said else None)
 
 
-def _judged(one: Assumed, shift: Shift, paper: OnPaper) -> Judgement | None:
+def _judged(one: Assumed, shift: StampDelay, paper: OnPaper) -> Judgement | None:
     finding, delay = shift.finding, shift.delay
     if delay is not None and delay.value is not None:
         words = (f"{finding.sentence}: on this log that is a delay of up to "
@@ -91,13 +91,13 @@ def _judged(one: Assumed, shift: Shift, paper: OnPaper) -> Judgement | None:
     return None
 
 
-def widened(figure: MeasuredFigure, moved: Sequence[Shift]) -> MeasuredFigure:
+def widened(figure: MeasuredFigure, moved: Sequence[StampDelay]) -> MeasuredFigure:
     """An interval of a delay, with what slight drifts and steps of the stamps add to it."""
     ends = [figure.low or 0.0, figure.high or 0.0, *_ends(moved)]
     return MeasuredFigure(figure.value, min(ends), max(ends))
 
 
-def _ends(moved: Sequence[Shift]) -> Iterator[float]:
+def _ends(moved: Sequence[StampDelay]) -> Iterator[float]:
     for each in moved:
         if each.delay is not None:
             yield from (end for end in (each.delay.value, each.delay.low, each.delay.high)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 
 from syncline_design.clocks.entry import values_of
-from syncline_design.clocks.result import EntryKind, Timing
+from syncline_design.clocks.result import ClockEntryKind, Timing
 from syncline_design.clocks.study import TimingStudy
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
@@ -75,7 +75,7 @@ def with_spec(timing: Timing, means: TimingMeaning | None) -> TimingAndSpec:
 
 
 def timing_meaning(
-    case: Case, study: TimingStudy, kind: EntryKind, identity: str, seed: int
+    case: Case, study: TimingStudy, kind: ClockEntryKind, identity: str, seed: int
 ) -> TimingMeaning | None:
     """Check the spec as it is, and with every vehicle on the measured clock; None: no bound."""
     bound = study.timing.bound_s

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from syncline_design.comparison.limits import beyond
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.verdict.tree import RequirementResult, Status, Verdict, Word
 
 SCHEMA = "syncline-design/diff/v1"
@@ -98,7 +98,7 @@ class RequirementChange(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Changes(Record):
+class VerdictChanges(Record):
     """What differs between two verdicts.
 
     outgrown, admitted: where the payload is another one, requirements whose value the old payload
@@ -125,14 +125,14 @@ class Cause(Record):
     key: str
     old: str | None
     new: str | None
-    effect: Changes | None = None
+    effect: VerdictChanges | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Difference(Record):
     """The difference of two specs or verdict files; exit_code: that of the new one."""
 
-    schema: Annotated[str, Named(SCHEMA)]
+    schema: Annotated[str, SchemaName(SCHEMA)]
     old: Compared
     new: Compared
     causes: tuple[Cause, ...]
@@ -148,7 +148,7 @@ class Difference(Record):
 
 
 def difference(
-    files: tuple[str, str], causes: tuple[Cause, ...], found: Changes, exit_code: int
+    files: tuple[str, str], causes: tuple[Cause, ...], found: VerdictChanges, exit_code: int
 ) -> Difference:
     """The whole of it from its parts."""
     old, new = files
@@ -159,11 +159,11 @@ def difference(
     )  # fmt: skip
 
 
-def changes(old: Verdict, new: Verdict) -> Changes:
+def changes(old: Verdict, new: Verdict) -> VerdictChanges:
     """Verdict, payload, sums, error and margins of two verdicts, side by side."""
     before, now = _sums(old), _sums(new)
     payload = tuple(_payload(old, new))
-    return Changes(
+    return VerdictChanges(
         VerdictChange(old.verdict, new.verdict),
         new.spec.currency,
         payload,

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from syncline_design.comparison.acceptance import AssumptionResult, MeasuredFigure, Status, worst
+from syncline_design.comparison.acceptance import (
+    AssumptionResult,
+    AssumptionStatus,
+    MeasuredFigure,
+    worst,
+)
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
@@ -17,7 +22,7 @@ class Judgement:
     from_s, to_s: the stretch that it is about; least_stretch_s: the shortest that it speaks about.
     """
 
-    status: Status
+    status: AssumptionStatus
     words: str
     measured: MeasuredFigure | None = None
     from_s: float | None = None

@@ -30,7 +30,7 @@ from syncline_design.spec.effects_listed import EffectChoice
 from syncline_design.verdict.bill import bill_of_materials
 from syncline_design.verdict.named import BillLine
 
-Kind = Literal["nothing", "calibrate", "rewire", "timestamping", "sensor"]
+RepairKind = Literal["nothing", "calibrate", "rewire", "timestamping", "sensor"]
 MOST_KEPT = 6  # options of one finding that others are combined with
 
 
@@ -41,7 +41,7 @@ class Remedy:
     roles: what is wired, stamped or bought otherwise; left: what of the effect remains.
     """
 
-    kind: Kind
+    kind: RepairKind
     finding: Finding
     text: str
     assumes: str
@@ -174,7 +174,7 @@ def _other_ways(
 ) -> Iterator[Remedy]:
     """The role stamped or taken otherwise, of each kind the front of price against error."""
     stage, role = at
-    found: dict[Kind, list[tuple[float, float, Option]]] = {}
+    found: dict[RepairKind, list[tuple[float, float, Option]]] = {}
     for present in (True, False):
         opened = _opened(whole, stage, role, present=present)
         for kind, price, error, option in _scored(case, opened, at, finding):
@@ -201,7 +201,7 @@ def _opened(whole: Case, stage: StageCase, role: RoleCase, *, present: bool) -> 
 
 def _scored(
     case: Case, opened: Case, at: tuple[StageCase, RoleCase], finding: Finding
-) -> Iterator[tuple[Kind, float, float, Option]]:
+) -> Iterator[tuple[RepairKind, float, float, Option]]:
     """Price and error of every option that a role then has."""
     stage, role = at
     now = sole_design(problem_of(case))
@@ -230,7 +230,7 @@ def _scored(
             yield kind, price, sums.error_m, option
 
 
-def _kind(now: tuple[str, str | None, str], option: Option, finding: Finding) -> Kind | None:
+def _kind(now: tuple[str, str | None, str], option: Option, finding: Finding) -> RepairKind | None:
     if option.sensor != now[0]:
         return "sensor"
     if _origin(finding) != "stamps" or option.names == now:
@@ -247,7 +247,9 @@ def _front(scored: list[tuple[float, float, Option]]) -> list[tuple[float, float
     return kept
 
 
-def _remedy(kind: Kind, finding: Finding, at: tuple[StageCase, RoleCase], option: Option) -> Remedy:
+def _remedy(
+    kind: RepairKind, finding: Finding, at: tuple[StageCase, RoleCase], option: Option
+) -> Remedy:
     stage, role = at
     way = f"by {option.primitive}, {option.method}"
     new = PinnedRole(stage.index, role.role, option.sensor, option.primitive, option.method)

@@ -11,8 +11,8 @@ from syncline_design.choice.effect_tables import NoBudget, problem_of
 from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.comparison.repair_options import (
-    Kind,
     Remedy,
+    RepairKind,
     applied,
     bought,
     compatible,
@@ -39,7 +39,7 @@ MOST_SHOWN = 8
 class RepairStep(Record):
     """What is done about one finding; assumes: what has to be so for it to help."""
 
-    kind: Kind
+    kind: RepairKind
     effect: str
     sensor: str
     stage: str
@@ -130,7 +130,7 @@ def _scored(case: Case, whole: Case, chosen: tuple[Remedy, ...]) -> Iterator[_Sc
 
 
 def _best_of_each_kind(scored: Sequence[_Scored]) -> Iterator[_Scored]:
-    kinds: dict[tuple[Kind, ...], list[_Scored]] = {}
+    kinds: dict[tuple[RepairKind, ...], list[_Scored]] = {}
     for one in scored:
         kinds.setdefault(tuple(remedy.kind for remedy in one.chosen), []).append(one)
     for alike in kinds.values():

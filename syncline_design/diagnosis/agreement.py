@@ -50,7 +50,7 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Spans:
+class WindowRows:
     """Windows of a log: first and last row of each, and their lengths [s]."""
 
     time_s: Array
@@ -86,7 +86,7 @@ class Spans:
         return float(rough * step * np.sqrt(np.median(self.last - self.first)))
 
 
-def windows_of(time_s: Array, length_s: float) -> Spans | None:
+def windows_of(time_s: Array, length_s: float) -> WindowRows | None:
     """Windows side by side of about one length, none over a gap; None where there are too few."""
     stamps, rows = np.unique(time_s, return_index=True)
     step = np.diff(stamps)
@@ -98,7 +98,7 @@ def windows_of(time_s: Array, length_s: float) -> Spans | None:
     whole = gaps[first] == gaps[last]
     if int(np.sum(whole)) < LEAST_WINDOWS:
         return None
-    return Spans(stamps, rows, first[whole], last[whole])
+    return WindowRows(stamps, rows, first[whole], last[whole])
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +147,7 @@ def disagreement(
 
 def _chosen(
     time_s: Array, place_m: Array | None, column: Array, rotation: Array, sigma_m: float
-) -> tuple[Spans, Array] | None:
+) -> tuple[WindowRows, Array] | None:
     """Windows in which there is motion to compare, and the pose's motion in them."""
     chosen = None
     for length_s in LENGTHS_S:
@@ -164,7 +164,7 @@ def _chosen(
     return chosen
 
 
-def _motion(spans: Spans, place_m: Array | None, rotation: Array) -> Array:
+def _motion(spans: WindowRows, place_m: Array | None, rotation: Array) -> Array:
     """Change of place [m], or sum of the turns [rad, body axes], over every window.
 
     The turns are summed step by step, as rates are: the turn between a window's ends is another
@@ -187,7 +187,9 @@ def _likeness(moved: Array, own: Array) -> float:
     return float(np.sum(moved * own)) ** 2 / size if size > 0.0 else 0.0
 
 
-def _late_words(spans: Spans, moved: Array, column: Array, lag_s: float, tolerance: float) -> str:
+def _late_words(
+    spans: WindowRows, moved: Array, column: Array, lag_s: float, tolerance: float
+) -> str:
     """Says that a column comes late, if only late it shows the pose's motion.
 
     A pose that is late has a name, so that a column which is ahead says nothing.
@@ -226,7 +228,7 @@ def _ratio(moved: Array, own: Array) -> float:
     return _size(own) / max(_size(moved), 1e-300)
 
 
-def _is_offset(spans: Spans, moved: Array, own: Array) -> bool:
+def _is_offset(spans: WindowRows, moved: Array, own: Array) -> bool:
     """Whether a constant accounts for the disagreement, and better than a factor does."""
     left = float(
         np.sum((own - _constant(spans, moved, own) * spans.length_s[:, None] - moved) ** 2)
@@ -256,24 +258,26 @@ def _missing(moved: Array, own: Array, sigma: float) -> str:
     return ""
 
 
-def _constant(spans: Spans, moved: Array, own: Array) -> Array:
+def _constant(spans: WindowRows, moved: Array, own: Array) -> Array:
     """Constant part of the column that the pose does not follow, over the whole log."""
     return np.asarray(np.sum(own - moved, axis=0) / float(np.sum(spans.length_s)))
 
 
-def _offset_words(spans: Spans, moved: Array, own: Array, places: bool) -> str:
+def _offset_words(spans: WindowRows, moved: Array, own: Array, places: bool) -> str:
     mean = _constant(spans, moved, own)
     k = int(np.argmax(np.abs(mean)))
     size = format_estimate(float(mean[k]), None, "m/s" if places else "rad/s")
     return f"they hold a constant {size} {'along' if places else 'about'} the {AXES[k]} axis"
 
 
-def _drifts(spans: Spans, moved: Array, own: Array, allowed: float) -> bool:
+def _drifts(spans: WindowRows, moved: Array, own: Array, allowed: float) -> bool:
     """Whether a constant part of the column is larger than the pose may be off by."""
     return bool(np.linalg.norm(_constant(spans, moved, own)) > allowed)
 
 
-def _allowed(spans: Spans, moved: Array, sigma: float, places: bool, tolerance: float) -> float:
+def _allowed(
+    spans: WindowRows, moved: Array, sigma: float, places: bool, tolerance: float
+) -> float:
     """Constant part [m/s or rad/s] that the poses leave room for.
 
     They may be off at both ends of every unbroken stretch: by noise, by what the vehicle moves

@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
-from syncline_design.diagnosis.noise_split import Factor, factors
+from syncline_design.diagnosis.noise_split import NoiseFactor, factors
 from syncline_design.diagnosis.result import Diagnosis
-from syncline_design.diagnosis.run import Examined, examined, told
+from syncline_design.diagnosis.run import SearchedLog, examined, told
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.diagnosis.stretches import Stands, Stretches, stretches
 from syncline_design.diagnosis.system import Measured, measured
@@ -42,7 +42,7 @@ class Sighted:
     found: Diagnosis
     stretches: Stretches = field(default_factory=Stretches)
     open: tuple[LeftOpen, ...] = ()
-    factors: Mapping[str, Factor] = field(default_factory=dict)
+    factors: Mapping[str, NoiseFactor] = field(default_factory=dict)
     beyond: Mapping[tuple[str, str], Beyond] = field(default_factory=dict)
     taken: tuple[Stands, ...] = ()
 
@@ -77,7 +77,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
         )
 
 
-def _seen(one: Examined) -> Stretches:
+def _seen(one: SearchedLog) -> Stretches:
     in_force().doing("looking at stretches of the log")
     model = one.result.model
     free = one.search.free_signatures(model)

@@ -12,7 +12,7 @@ from syncline_design.diagnosis.noise import Directed
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
-from syncline_design.effects.record import SELDOM, Array, Effect, Target
+from syncline_design.effects.record import SELDOM, ActsOn, Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Stage
 
@@ -27,7 +27,7 @@ class Candidate:
     """An effect at one place of the system."""
 
     effect: Effect
-    sensor: Target
+    sensor: ActsOn
     stage: int
 
     @property
@@ -83,7 +83,7 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
     return tuple(found)
 
 
-def _can_have(effect: Effect, stage: Stage, sensor: Target, index: int) -> bool:
+def _can_have(effect: Effect, stage: Stage, sensor: ActsOn, index: int) -> bool:
     """Whether a stage can have it; a later one's position is its transponder's place."""
     carried = effect.transponder and sensor == "position" and index > 0
     return carried or effect.applies(stage, sensor)

@@ -36,7 +36,7 @@ HALVINGS = 40
 
 
 @dataclass(frozen=True, slots=True)
-class Promise:
+class SpecPromise:
     """What a spec promises: its system, the limits on the total error [m], on the sync ratio."""
 
     system: System
@@ -100,7 +100,7 @@ def _with(entry: EffectEntry, name: str, value: float) -> EffectEntry:
     return replace(entry, parameters=values)
 
 
-def promise_of(case: Case) -> Promise | None:
+def promise_of(case: Case) -> SpecPromise | None:
     """The promise of a spec that leaves nothing open."""
     found = sole_design(build_problem(case))
     if found is None:
@@ -109,7 +109,7 @@ def promise_of(case: Case) -> Promise | None:
     design_budget(case, problem, design)
     accuracy, sync = _limits(case, "accuracy"), _limits(case, "sync") or (IMPLIED_SYNC,)
     per_sensor = case.spec.sync_model == "per_sensor"
-    return Promise(system_of(case, problem, design), accuracy, sync, per_sensor)
+    return SpecPromise(system_of(case, problem, design), accuracy, sync, per_sensor)
 
 
 def _limits(case: Case, kind: str) -> tuple[float, ...]:
@@ -136,7 +136,7 @@ class Weights:
     """Judges what is material on one log."""
 
     spec_m: float
-    promise: Promise | None = None
+    promise: SpecPromise | None = None
 
     def material(self, size_m: float, entry: EffectEntry) -> bool:
         """Whether a finding of this RMS is."""
@@ -152,13 +152,13 @@ class Weights:
         return self.promise is not None and self.promise.turned_by(causes, size_m)
 
 
-def weighed(promise: Promise | None, data: Data) -> Weights:
+def weighed(promise: SpecPromise | None, data: Data) -> Weights:
     """The weights of one log."""
     return Weights(expected_rms_m(data), promise)
 
 
 def blind_spots(
-    promise: Promise | None, seen: Sequence[tuple[EffectEntry, str, float, float]]
+    promise: SpecPromise | None, seen: Sequence[tuple[EffectEntry, str, float, float]]
 ) -> Iterator[tuple[EffectEntry, str, float, float]]:
     """(entry, parameter, smallest seen, where it turns a requirement) of what a log may hide.
 

@@ -25,7 +25,7 @@ from syncline_design.effects.kinematics import (
     rotate,
     rotation_to_euler,
 )
-from syncline_design.effects.record import Array, Target
+from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.log import Log, LogTrack, StageLog
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_places
@@ -60,7 +60,7 @@ class Convention:
     work: how much it changes, for ties; upright: whether the vehicle keeps its belly down.
     """
 
-    sensor: Target
+    sensor: ActsOn
     convention: str
     mend: Mend
     work: int

@@ -18,7 +18,7 @@ import numpy as np
 
 from syncline_design.diagnosis.fitting import Data, Model, data_of
 from syncline_design.diagnosis.motion_scatter import lasting
-from syncline_design.diagnosis.noise import Sensor, as_specified, white_covariance
+from syncline_design.diagnosis.noise import SensorKey, as_specified, white_covariance
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
@@ -45,7 +45,7 @@ class Episode:
     spread: standard uncertainty of the factor; gain: nat saved.
     """
 
-    sensor: Sensor
+    sensor: SensorKey
     from_s: float
     to_s: float
     factor: float
@@ -100,7 +100,7 @@ def _in_sensor(
     data: Data,
     left: Array,
     white: Array,
-    part: tuple[Sensor, Array],
+    part: tuple[SensorKey, Array],
     rng: np.random.Generator,
 ) -> Episode | None:
     """The stretch in which one sensor's noise is larger, if there is one."""

@@ -17,10 +17,10 @@ import numpy as np
 from syncline_design.diagnosis.conventions import best_conventions, is_of_unit
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.scene import Scene, scene
-from syncline_design.diagnosis.slips import Shift, attitude_restamped, best_shifts
+from syncline_design.diagnosis.slips import StampShift, attitude_restamped, best_shifts
 from syncline_design.effects import plain_delay, registry
 from syncline_design.effects.acting import Acting
-from syncline_design.effects.record import Array, Effect, Target
+from syncline_design.effects.record import ActsOn, Array, Effect
 from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
 from syncline_design.logs.merging import hermite
 from syncline_design.logs.stamps import per_stamp
@@ -217,7 +217,9 @@ class _Looking:
         listed, shift = (_unless_smoothed(one, base, self.exclude) for one in (listed, shift))
         return _preferred(_preferred(listed, shift), wide)
 
-    def _listed(self, log: Log, base: Scene, taken: Sequence[tuple[str, str, int]]) -> list[Trial]:
+    def _listed(
+        self, log: Log, base: Scene, taken: Sequence[tuple[str, str, int]]
+    ) -> list[GrossTrial]:
         return _trials(self.system, log, base, taken, self.exclude, self.reread)
 
     def pair(self, log: Log) -> tuple[tuple[Gross, ...], Log] | None:
@@ -283,7 +285,7 @@ def _clear(best: _Tried | None, size_m: float, expected_m: float) -> bool:
     return not short or best.size_m < NEARLY_FREE * expected_m
 
 
-def _best(trials: Sequence[Trial]) -> _Tried | None:
+def _best(trials: Sequence[GrossTrial]) -> _Tried | None:
     """The trial of least error, the first of equals."""
     return min(map(_tried_out, trials), key=lambda one: one.size_m, default=None)
 
@@ -295,7 +297,7 @@ def _again(one: Acting, taken: Sequence[Acting]) -> bool:
     return value in before or (is_of_unit(value) and any(map(is_of_unit, before)))
 
 
-def _tried_out(trial: Trial) -> _Tried:
+def _tried_out(trial: GrossTrial) -> _Tried:
     return _Tried(trial.acting, trial.mend, usual_size(trial.error()))
 
 
@@ -326,7 +328,7 @@ def _instead_of(found: Acting) -> Effect | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
+class GrossTrial:
     """A gross fault to be tried: the error of the log with it undone, and how to undo it."""
 
     acting: Acting
@@ -350,24 +352,24 @@ def _trials(
     taken: Sequence[tuple[str, str, int]],
     exclude: Sequence[str],
     reread: Reread | None,
-) -> list[Trial]:
+) -> list[GrossTrial]:
     """Every listed gross fault with a function that re-simulates the log under it."""
     faults = [e for e in registry().values() if e.undoing is not None and e.name not in exclude]
     return [
-        Trial(one, _resimulated(system, base, one), partial(mended, one=one, reread=reread))
+        GrossTrial(one, _resimulated(system, base, one), partial(mended, one=one, reread=reread))
         for effect in faults
         for one in _tried(system, log, effect)
         if one.label not in taken
     ]
 
 
-def _searched(system: System, log: Log, base: Scene, exclude: Sequence[str]) -> list[Trial]:
+def _searched(system: System, log: Log, base: Scene, exclude: Sequence[str]) -> list[GrossTrial]:
     """The best of all conventions, to be re-simulated."""
     found = []
     effect = _undone(by_mending=True)
     for one in best_conventions(system, base.log) if effect.name not in exclude else []:
         acting = Acting(effect, one.sensor, 0, {"convention": one.convention})  # type: ignore[dict-item]
-        found.append(Trial(acting, partial(_error, system, log, base, one.mend), one.mend))
+        found.append(GrossTrial(acting, partial(_error, system, log, base, one.mend), one.mend))
     return found
 
 
@@ -380,7 +382,7 @@ def _error(system: System, log: Log, base: Scene, mend: Callable[[Log], Log]) ->
 
 def _shifts(
     system: System, log: Log, base: Scene, exclude: Sequence[str], reread: Reread | None
-) -> list[Trial]:
+) -> list[GrossTrial]:
     """The best shifts of stamps."""
     found = []
     for shift in best_shifts(system, log):
@@ -388,11 +390,11 @@ def _shifts(
         if acting.effect.name not in exclude and abs(shift.seconds) > SHORT_SHIFT_S:
             seconds = float(next(iter(acting.values.values())))
             mend = partial(_shifted, sensor=shift.sensor, seconds=seconds, reread=reread)
-            found.append(Trial(acting, partial(_error, system, log, base, mend), mend))
+            found.append(GrossTrial(acting, partial(_error, system, log, base, mend), mend))
     return found
 
 
-def _shift_named(shift: Shift) -> Acting:
+def _shift_named(shift: StampShift) -> Acting:
     """Whole seconds are a slip where a sensor can have one, a delay beside it; else a delay."""
     whole = float(round(shift.seconds))
     slip = _undone(by_mending=False)
@@ -411,7 +413,7 @@ def _undone(*, by_mending: bool) -> Effect:
     )  # fmt: skip
 
 
-def _shifted(log: Log, sensor: Target, seconds: float, reread: Reread | None) -> Log:
+def _shifted(log: Log, sensor: ActsOn, seconds: float, reread: Reread | None) -> Log:
     if sensor == "attitude":
         return attitude_restamped(log, seconds)
     return restamped(log, seconds, reread)

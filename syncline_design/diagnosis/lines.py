@@ -22,6 +22,7 @@ from syncline_design.diagnosis.fitting import Data, Model, inner, solve_scaled, 
 from syncline_design.diagnosis.followed import heading_is_noise
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -30,7 +31,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.machine.quick_dataclass import dataclass
@@ -64,7 +64,7 @@ class Wave:
 
     over: str
     cycles: float
-    sensor: Target
+    sensor: ActsOn
     stage: int
     reading: int
 
@@ -75,7 +75,7 @@ class Wave:
         turned: Array = 2.0 * math.pi * self.cycles * along
         return turned
 
-    def depart(self, rows: StageRows, values: Values, _: Target, __: Rng) -> Departures:
+    def depart(self, rows: StageRows, values: Values, _: ActsOn, __: Rng) -> Departures:
         """reading = true + cosine cos(phase) + sine sin(phase)."""
         cosine, sine = values.values()
         angle = self.phase(rows)
@@ -122,7 +122,7 @@ class Wave:
                 "channel": (NAMES[self.sensor][self.reading], "")}  # fmt: skip
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """Nothing: a wave without a cause is not written into a spec."""
     return Contribution()
 
@@ -164,7 +164,7 @@ def _columns(data: Data, candidate: Candidate) -> Array:
     return np.nan_to_num(slopes(data.view, (one,)))
 
 
-def _readings(data: Data) -> Iterator[tuple[Target, int, int, Array]]:
+def _readings(data: Data) -> Iterator[tuple[ActsOn, int, int, Array]]:
     """(sensor, stage, reading, what one sigma of it does to the error (n, 3)) of all that count."""
     stages = [stage.name for stage in data.view.system.stages]
     for (stage, sensor), loading in channels(data.view):
@@ -196,7 +196,7 @@ def _outstanding(
     over: str,
     cycles: Array,
     along: Array,
-    readings: list[tuple[Target, int, int, Array]],
+    readings: list[tuple[ActsOn, int, int, Array]],
     scores: Array,
 ) -> Iterator[tuple[float, Wave, float]]:
     """The strongest wave of every reading, where its power is none that neighbours have."""

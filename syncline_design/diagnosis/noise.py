@@ -20,7 +20,7 @@ from syncline_design.logs.log import Rows
 from syncline_design.logs.stamps import repeated
 from syncline_design.machine.quick_dataclass import dataclass
 
-Sensor = tuple[str, str]  # (stage, role)
+SensorKey = tuple[str, str]  # (stage, role)
 
 FACTOR_LIMIT = 1.1  # white noise up to this factor of the spec's is the spec's
 SLOW_LIMIT = 1.2  # slow variance over the spec's that still is of the spec's size
@@ -50,7 +50,7 @@ class White:
     deviation of every reading does; None: alike.
     """
 
-    sensor: Sensor
+    sensor: SensorKey
     covariance: Array
     loading: Array | None = None
     growth: Array | None = None
@@ -88,7 +88,7 @@ class Slow:
     that the variance of its mean over the log may be, as far as the log's own courses show.
     """
 
-    sensor: Sensor
+    sensor: SensorKey
     loading: Array
     shared_time: bool  # one time constant for all columns
     limits: tuple[float, ...] = (SLOW_LIMIT,) * 3
@@ -174,7 +174,7 @@ class Bounds:
     factor: tuple[float, ...]
     slow: tuple[tuple[float, ...], ...]
 
-    def opened(self, structure: Structure, sensor: Sensor, what: str) -> Bounds:
+    def opened(self, structure: Structure, sensor: SensorKey, what: str) -> Bounds:
         """Open the factor ("factor", "tails"), all slow variances ("slow") or one ("down")."""
         factor = tuple(
             OPEN if what in ("factor", "tails") and w.sensor == sensor else limit

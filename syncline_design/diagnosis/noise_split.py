@@ -29,7 +29,7 @@ LEAST_ROWS: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Factor:
+class NoiseFactor:
     """A sensor's standard deviation over the spec's, white and slow together, at 95 %."""
 
     value: float
@@ -37,7 +37,7 @@ class Factor:
     high: float
 
 
-def factors(data: Data, model: Model) -> Mapping[str, Factor]:
+def factors(data: Data, model: Model) -> Mapping[str, NoiseFactor]:
     """Of every sensor that the log's error is made of, by `stage/sensor`."""
     white = data.structure.white
     if len(data.view) < LEAST_ROWS or not white or not data.axes:
@@ -59,7 +59,7 @@ def factors(data: Data, model: Model) -> Mapping[str, Factor]:
     spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum(off**2, axis=0))
     reach = float(t.isf(0.025, BLOCKS - 1)) * spread
     return {
-        "/".join(w.sensor): Factor(_root(v), _root(v - r), _root(v + r))
+        "/".join(w.sensor): NoiseFactor(_root(v), _root(v - r), _root(v + r))
         for w, v, r in zip(white, values, reach, strict=True)
     }
 

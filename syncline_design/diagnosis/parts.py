@@ -20,7 +20,7 @@ from syncline_design.diagnosis.candidates import Signature, slopes
 from syncline_design.diagnosis.fitting import Model, fit
 from syncline_design.diagnosis.noise import NoiseLevel, precision
 from syncline_design.diagnosis.slow_states import BLOCKS, INSIDE, LEAST_ROWS, States, fitted_of
-from syncline_design.diagnosis.spans import Span, cut_to, cuttable, span_of
+from syncline_design.diagnosis.spans import StampSpan, cut_to, cuttable, span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
@@ -36,7 +36,7 @@ SURE = 2.0  # standard uncertainties of that
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundPart:
     """A stretch in blocks [first, last): nat by which it is better than the whole log."""
 
     first: int
@@ -45,7 +45,7 @@ class Found:
     better: float
 
 
-def best_stretch(states: States, model: Model, column: Array, known: float) -> Found | None:
+def best_stretch(states: States, model: Model, column: Array, known: float) -> FoundPart | None:
     """The stretch in which a column (n, 3, 1) is worth most; `known` of it is taken out already."""
     if states.count < BLOCKS:
         return None
@@ -54,7 +54,7 @@ def best_stretch(states: States, model: Model, column: Array, known: float) -> F
     return _best(*states.sums_of(model, every, own.shape[2] + 1), known)
 
 
-def _best(normal: Array, score: Array, prior: Array, known: float) -> Found:
+def _best(normal: Array, score: Array, prior: Array, known: float) -> FoundPart:
     """Of sums by block (G, m, m), (G, m): the first column in stretches, the rest in all."""
     score = score + normal[:, :, 0] * known
     count = normal.shape[0]
@@ -75,7 +75,7 @@ def _best(normal: Array, score: Array, prior: Array, known: float) -> Found:
 
     whole = gain(0, count)
     tried = [
-        Found(a, b, (g := gain(a, b)), g - whole)
+        FoundPart(a, b, (g := gain(a, b)), g - whole)
         for a, b in itertools.combinations(range(count + 1), 2)
         if LEAST <= b - a <= MOST
     ]
@@ -115,7 +115,7 @@ def _judged(
     states: States,
     model: Model,
     one: Signature,
-    best: Found,
+    best: FoundPart,
     column: Array,
     level: NoiseLevel,
 ) -> tuple[float, Signature]:
@@ -166,19 +166,19 @@ def refined(states: States, model: Model) -> Model:
     return model
 
 
-def _blocks(states: States, span: Span) -> Found:
+def _blocks(states: States, span: StampSpan) -> FoundPart:
     inside = states.block[span.mask(states.data.view.log.time_s) > 0.0]
-    return Found(int(inside[0]), int(inside[-1]) + 1, 0.0, 0.0)
+    return FoundPart(int(inside[0]), int(inside[-1]) + 1, 0.0, 0.0)
 
 
-def _exchanged(states: States, model: Model, one: Acting, span: Span) -> Model:
+def _exchanged(states: States, model: Model, one: Acting, span: StampSpan) -> Model:
     """The model with an effect cut to a stretch, fitted again."""
     cut = replace(one, effect=span.cut)
     acting = tuple(cut if a.label == one.label else a for a in model.acting)
     return fit(states.data, acting, model.opened, start=model.level)
 
 
-def _alone(states: States, model: Model, one: Acting, span: Span) -> bool:
+def _alone(states: States, model: Model, one: Acting, span: StampSpan) -> bool:
     """Whether the effect inside differs from that outside, which is next to nothing."""
     data = states.data
     own = next(a for a in model.acting if a.label == one.label)
@@ -203,9 +203,9 @@ def _span(
     model: Model,
     effect: Effect,
     shape: Array,
-    found: Found,
+    found: FoundPart,
     known: Array | float = 0.0,
-) -> Span:
+) -> StampSpan:
     """The stretch to the row: its ends by turns where the effect (n, 3) saves most, ever finer.
 
     known (n,): how much of the effect is taken out of each row already.
@@ -226,7 +226,7 @@ def _span(
                 gains = _gains(model, weighted, shape, tried)
                 ends = list(tried[int(np.argmax(gains))])
         reach = max(2.0 * reach / (PLACES - 1), 1.0)
-    return Span(effect, float(time_s[ends[0]]), float(time_s[ends[1] - 1]))
+    return StampSpan(effect, float(time_s[ends[0]]), float(time_s[ends[1] - 1]))
 
 
 def _gains(model: Model, weighted: Array, shape: Array, tried: list[tuple[int, int]]) -> Array:
@@ -240,5 +240,5 @@ def _gains(model: Model, weighted: Array, shape: Array, tried: list[tuple[int, i
     return gains
 
 
-def _within(states: States, span: Span) -> States:
+def _within(states: States, span: StampSpan) -> States:
     return states.within(span.mask(states.data.view.log.time_s) > 0.0, INSIDE)

@@ -69,7 +69,7 @@ class Arrow(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Track(Record):
+class PlottedTrack(Record):
     """The way of the last stage's reference point, with the residuals along it."""
 
     north_m: tuple[float, ...]
@@ -101,7 +101,7 @@ class Plots(Record):
     residuals: Residuals
     where_map: tuple[CovariateMap, ...]
     coverage: tuple[Coverage, ...]
-    track: Track | None = optional()
+    track: PlottedTrack | None = optional()
     motion: Mapping[str, tuple[float, ...]] | None = optional()
     spectrum: Spectrum | None = optional()
     normal: NormalPlot | None = optional()

@@ -11,8 +11,8 @@ from syncline_design.diagnosis.noise import white_covariance
 from syncline_design.diagnosis.plotted import (
     Arrow,
     NormalPlot,
+    PlottedTrack,
     Spectrum,
-    Track,
 )
 from syncline_design.diagnosis.regimes import covariates
 from syncline_design.diagnosis.search import SearchResult
@@ -32,7 +32,7 @@ def listed(values: Array) -> tuple[float, ...]:
     return tuple(rounded(v, DIGITS) for v in values)
 
 
-def track_of(data: Data, before: Array, after: Array, index: Array) -> Track:
+def track_of(data: Data, before: Array, after: Array, index: Array) -> PlottedTrack:
     """The way and the mean residuals of stretches of it, horizontal."""
     place = data.view.rows[-1].position_m
     ends = np.unique(np.linspace(0, len(place), ARROWS + 1).astype(int))
@@ -41,7 +41,7 @@ def track_of(data: Data, before: Array, after: Array, index: Array) -> Track:
         middle, first, last = (np.mean(v[a:b, :2], axis=0) for v in (place, before, after))
         arrows.append(Arrow(*listed(np.concatenate([middle, first, last]))))
     rows = index.astype(int)
-    return Track(listed(place[rows, 0]), listed(place[rows, 1]), tuple(arrows))
+    return PlottedTrack(listed(place[rows, 0]), listed(place[rows, 1]), tuple(arrows))
 
 
 def motion_of(data: Data, index: Array) -> dict[str, tuple[float, ...]]:

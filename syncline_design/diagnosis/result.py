@@ -10,7 +10,7 @@ from typing import Annotated, Final, Literal
 from syncline_design.diagnosis.plotted import Plots
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.spec.effects_listed import EffectChoice
 
 SCHEMA: Final = "syncline-design/diagnosis/v1"
@@ -349,7 +349,7 @@ class Informative(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Motion(Record):
+class MotionQuantiles(Record):
     """5 and 95 % quantile of one covariate; most: its largest size."""
 
     low: float
@@ -371,7 +371,7 @@ class LogRead(Record):
     duration_s: float
     interval_s: float
     fitted: int
-    motion: Mapping[str, Motion]
+    motion: Mapping[str, MotionQuantiles]
 
 
 @dataclass(frozen=True, slots=True)
@@ -413,7 +413,7 @@ class SpecRead(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Provenance(Record):
+class DiagnosisProvenance(Record):
     """What the answer depends on besides the log."""
 
     version: str
@@ -493,7 +493,7 @@ class Diagnosis(Record):
     together, each as a run of its own.
     """
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     verdict: LogOutcome
     sound: bool
     checks: tuple[Check, ...]
@@ -509,7 +509,7 @@ class Diagnosis(Record):
     plots: Plots
     spec: SpecRead | None
     log_files: tuple[str, ...]
-    provenance: Provenance
+    provenance: DiagnosisProvenance
     informative: Informative = Informative(True)
     smallest_seen: tuple[Smallest, ...] = ()
     plan: NextDrive | None = optional()

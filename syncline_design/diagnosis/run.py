@@ -17,7 +17,7 @@ from syncline_design.diagnosis.candidates import (
     plain_signatures,
 )
 from syncline_design.diagnosis.checks import log_checks
-from syncline_design.diagnosis.consequence import Promise, promise_of, rms_m, weighed
+from syncline_design.diagnosis.consequence import SpecPromise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.findings import (
     entry_of,
@@ -47,13 +47,13 @@ from syncline_design.diagnosis.remainder import remainder
 from syncline_design.diagnosis.result import (
     Check,
     Diagnosis,
+    DiagnosisProvenance,
     Finding,
     Likelihoods,
     LogOutcome,
     LogRead,
-    Motion,
+    MotionQuantiles,
     Noise,
-    Provenance,
     Regime,
     Remaining,
     SlowNoise,
@@ -62,8 +62,8 @@ from syncline_design.diagnosis.result import (
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.search import (
     DiagnosisSettings,
-    Progress,
     Search,
+    SearchProgress,
     SearchResult,
     silent,
     start_search,
@@ -94,7 +94,7 @@ def diagnose(
     spec: Case | Path | str,
     log_paths: Sequence[Path | str] = (),
     settings: DiagnosisSettings | None = None,
-    progress: Progress = silent,
+    progress: SearchProgress = silent,
 ) -> Diagnosis:
     """Find where a log disagrees with its spec, name what is missing, and show the gap shrink.
 
@@ -108,7 +108,7 @@ def diagnose(
         return diagnose_measured(inputs, settings or DiagnosisSettings(), case, said)
 
 
-def _within_time(progress: Progress) -> Progress:
+def _within_time(progress: SearchProgress) -> SearchProgress:
     """The same progress; OutOfTime instead once the time is over."""
 
     def said(words: str, share: float) -> None:
@@ -119,7 +119,7 @@ def _within_time(progress: Progress) -> Progress:
 
 
 @dataclass(frozen=True, slots=True)
-class Examined:
+class SearchedLog:
     """A log that was searched: gross faults undone, the model settled.
 
     replaced: columns of motion that contradict the poses, whose slopes were taken instead.
@@ -139,8 +139,8 @@ class Examined:
 
 
 def examined(
-    inputs: Measured, settings: DiagnosisSettings, progress: Progress = silent
-) -> Examined:
+    inputs: Measured, settings: DiagnosisSettings, progress: SearchProgress = silent
+) -> SearchedLog:
     """Undo what is grossly wrong with a log, and look for what is missing."""
     progress("looking for gross faults", 0.05)
     faults, log = gross_faults(
@@ -153,7 +153,7 @@ def examined(
     view = scene(inputs.system, _in_windows(log), inputs.known)
     wrong = () if is_excusable(view) else contradictions(view)
 
-    def asked(wrong: tuple[Check, ...]) -> Examined:
+    def asked(wrong: tuple[Check, ...]) -> SearchedLog:
         sloped = with_slopes(log, wrong)
         return replace(_examined(inputs, tuple(faults), sloped, settings, progress), replaced=wrong)
 
@@ -167,8 +167,8 @@ def _examined(
     faults: tuple[Gross, ...],
     log: Log,
     settings: DiagnosisSettings,
-    progress: Progress,
-) -> Examined:
+    progress: SearchProgress,
+) -> SearchedLog:
     """Look for what is missing in a log; positions that are off by whole seconds are put back."""
     data, search, result = _searched(inputs, log, settings, progress)
     slip = _slip(result)
@@ -177,20 +177,22 @@ def _examined(
         faults = (*faults, Gross(slip, before / max(usual_size(result.model.error), 1e-300)))
         log = mended(log, slip, inputs.reread)
         data, search, result = _searched(inputs, log, settings, progress)
-    return Examined(inputs, faults, data, search, result)
+    return SearchedLog(inputs, faults, data, search, result)
 
 
 def diagnose_measured(
     inputs: Measured,
     settings: DiagnosisSettings,
     case: Case | None = None,
-    progress: Progress = silent,
+    progress: SearchProgress = silent,
 ) -> Diagnosis:
     """The diagnosis of a system and a log that are already in memory."""
     return told(examined(inputs, settings, progress), case, progress)
 
 
-def told(one: Examined, case: Case | None = None, progress: Progress = silent) -> Diagnosis:
+def told(
+    one: SearchedLog, case: Case | None = None, progress: SearchProgress = silent
+) -> Diagnosis:
     """What a searched log says, in figures: what is left, what it means, how the gap closes."""
     inputs, faults, data, search, result = (
         one.inputs, one.faults, one.data, one.search, one.result
@@ -251,7 +253,7 @@ class WeighedUp:
         return outcome(self.findings, self.sound and not self.remaining.material)
 
 
-def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
+def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     """Findings and remainder of a settled model, each with whether it matters."""
     data, search, result, faults = one.data, one.search, one.result, one.faults
     untouched = one.untouched
@@ -328,7 +330,7 @@ def stand_ins(
 
 
 def _searched(
-    inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress
+    inputs: Measured, log: Log, settings: DiagnosisSettings, progress: SearchProgress
 ) -> tuple[Data, Search, SearchResult]:
     """The search over one log; of a long one, over windows of it."""
     search = _started(inputs, _in_windows(log), settings, progress)
@@ -341,7 +343,7 @@ def _in_windows(log: Log) -> Log:
 
 
 def _started(
-    inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress = silent
+    inputs: Measured, log: Log, settings: DiagnosisSettings, progress: SearchProgress = silent
 ) -> Search:
     """A search over a log, ready to run."""
     data = prepared(inputs, log, settings.exclude_effects)
@@ -399,7 +401,7 @@ def _unseen_parts(result: SearchResult) -> tuple[str, ...]:
 def _log_read(log: Log, data: Data) -> LogRead:
     """What was read of a log, and how it moves: every covariate but time and angles."""
     motion = {
-        c.name: Motion(float(low), float(high), c.unit, float(np.max(np.abs(c.values))))
+        c.name: MotionQuantiles(float(low), float(high), c.unit, float(np.max(np.abs(c.values))))
         for c in covariates(data.view)
         if c.name in ("speed", "turn_rate", "range")
         for low, high in [np.quantile(c.values, [0.05, 0.95])]
@@ -430,9 +432,9 @@ def _noise(data: Data, result: SearchResult) -> Noise:
     )
 
 
-def provenance_of(settings: DiagnosisSettings, case: Case | None) -> Provenance:
+def provenance_of(settings: DiagnosisSettings, case: Case | None) -> DiagnosisProvenance:
     """What an answer depends on besides the log."""
-    return Provenance(
+    return DiagnosisProvenance(
         version=__version__,
         seed=settings.seed,
         false_alarm_rate=settings.false_alarm_rate,

@@ -21,7 +21,7 @@ from syncline_design.diagnosis.unsettled import without_unlogged_past
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
-from syncline_design.effects.record import Array, Departures, StageRows, Target
+from syncline_design.effects.record import ActsOn, Array, Departures, StageRows
 from syncline_design.logs.log import Log, LogTrack, Rows, StageLog
 from syncline_design.logs.stamps import per_stamp
 from syncline_design.machine.quick_dataclass import dataclass
@@ -327,6 +327,6 @@ def _true_vector(view: Scene, index: int, departed: Departures) -> Array:
     return vector
 
 
-def acting(name: str, sensor: Target, stage: int, values: Mapping[str, float]) -> Acting:
+def acting(name: str, sensor: ActsOn, stage: int, values: Mapping[str, float]) -> Acting:
     """An effect of the dictionary at work."""
     return Acting(registry()[name], sensor, stage, dict(values))

@@ -65,7 +65,7 @@ EPISODES = 7  # key of the draws that look for them
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
 Label = tuple[str, str, int]
-Progress = Callable[[str, float], None]  # (what is being done, share done 0..1)
+SearchProgress = Callable[[str, float], None]  # (what is being done, share done 0..1)
 
 
 def silent(_: str, __: float) -> None:

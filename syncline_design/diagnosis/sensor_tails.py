@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import gammaln
 
 from syncline_design.diagnosis.fitting import Data, Model
-from syncline_design.diagnosis.noise import Sensor, white_covariance
+from syncline_design.diagnosis.noise import SensorKey, white_covariance
 from syncline_design.diagnosis.tails import OUTLIER_NATS
 from syncline_design.effects.record import OUTLIER_FACTOR, Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -47,7 +47,7 @@ class SensorTails:
     wider: float = 0.0
 
 
-def sensor_tails(data: Data, model: Model, sensor: Sensor) -> SensorTails:
+def sensor_tails(data: Data, model: Model, sensor: SensorKey) -> SensorTails:
     """Tails of one sensor in what a model leaves, its core as wide as the spec's if it can be."""
     structure, axes = data.structure, list(data.axes)
     index = [part.sensor for part in structure.white].index(sensor)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2, f, t
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, hidden_by_noise, zero_values
-from syncline_design.diagnosis.consequence import Promise, blind_spots
+from syncline_design.diagnosis.consequence import SpecPromise, blind_spots
 from syncline_design.diagnosis.positive import pseudo_inverse
 from syncline_design.diagnosis.result import BlindSpot, Informative, Smallest
 from syncline_design.diagnosis.search import Search, SearchResult
@@ -21,7 +21,7 @@ from syncline_design.model.normal import NEARLY_ALL
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class DetectionLimit:
     """The smallest value of one parameter that is seen in half of such logs, and the one that is
     in nearly all of them, at most `most`; entry: all at zero; within: what this log leaves open."""
 
@@ -41,7 +41,7 @@ class Seen:
         return Smallest(e.effect, e.sensor, e.stage, self.parameter, value, sure, within)
 
 
-def smallest_seen(search: Search, result: SearchResult) -> tuple[Seen, ...]:
+def smallest_seen(search: Search, result: SearchResult) -> tuple[DetectionLimit, ...]:
     """Of every effect that moves the mean, is not named and no other name's double, by parameter.
 
     Half of the logs with a true value v beat the threshold T of the statistic v^2 / V where
@@ -58,7 +58,7 @@ def smallest_seen(search: Search, result: SearchResult) -> tuple[Seen, ...]:
     ]
     judged = search.states.judged(model, [s.columns for s in free]) if free else []
     log_p = search.chance(len({s.candidate.label for s in search.signatures}))
-    found: list[Seen] = []
+    found: list[DetectionLimit] = []
     for s, one in zip(free, judged, strict=True):
         found += _of(search, s, one, log_p)
     hidden = hidden_by_noise(search.data.view, search.settings.exclude_effects)
@@ -71,13 +71,13 @@ def _entry(search: Search, one: Candidate) -> EffectEntry:
     return EffectEntry(one.effect.name, one.sensor, stage.name, values)
 
 
-def _blind(search: Search, one: Candidate) -> Iterator[Seen]:
+def _blind(search: Search, one: Candidate) -> Iterator[DetectionLimit]:
     """No size of what follows values that are noise in this log shows in it."""
     for p in one.effect.slopes():
-        yield Seen(_entry(search, one), p.name, math.inf, p.high)
+        yield DetectionLimit(_entry(search, one), p.name, math.inf, p.high)
 
 
-def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
+def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[DetectionLimit]:
     effect, entry = s.candidate.effect, _entry(search, s.candidate)
     sizes = [_both(one.model, log_p)]
     sizes += [_both(covariance, log_p, count) for covariance, count in one.jackknives]
@@ -86,7 +86,7 @@ def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
     values = [[float(v) if ok else math.inf for v, ok in zip(row, seen, strict=True)]
               for row in size]  # fmt: skip
     return [
-        Seen(entry, p.name, half, p.high, sure, float(within))
+        DetectionLimit(entry, p.name, half, p.high, sure, float(within))
         for p, half, sure, within in zip(effect.slopes(), *values, left_within(one), strict=True)
     ]
 
@@ -132,7 +132,7 @@ def _both(covariance: Array, log_p: float, count: int = 0) -> Array:
     return sizes
 
 
-def informative(promise: Promise | None, shown: Sequence[Seen]) -> Informative:
+def informative(promise: SpecPromise | None, shown: Sequence[DetectionLimit]) -> Informative:
     """Whether every effect that would turn a requirement would have been seen."""
     asked = [(one.entry, one.parameter, one.smallest, one.most) for one in shown]
     most = {(one.entry, one.parameter): one.most for one in shown}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from syncline_design.diagnosis.scene import levers
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
-from syncline_design.effects.record import Array, Target
+from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.log import Log
 from syncline_design.logs.stamps import per_stamp
 from syncline_design.machine.quick_dataclass import dataclass
@@ -31,10 +31,10 @@ WHOLE_S = 0.03  # a shift this near to whole seconds is one
 
 
 @dataclass(frozen=True, slots=True)
-class Shift:
+class StampShift:
     """stamp = true + seconds, of one sensor."""
 
-    sensor: Target
+    sensor: ActsOn
     seconds: float
     size_m: float
 
@@ -44,7 +44,7 @@ class Shift:
         return bool(round(self.seconds)) and abs(self.seconds - round(self.seconds)) < WHOLE_S
 
 
-def best_shifts(system: System, log: Log) -> list[Shift]:
+def best_shifts(system: System, log: Log) -> list[StampShift]:
     """The best shift of the positions and of the attitudes of a log of one stage."""
     held = log.stages[0]
     if len(system.stages) != 1 or held.antenna_m is None or len(log) < ROWS // 10:
@@ -81,7 +81,7 @@ def best_shifts(system: System, log: Log) -> list[Shift]:
     return found
 
 
-def _best(sensor: Target, stamps_s: Array, error: Callable[[Array], Array], log: Log) -> Shift:
+def _best(sensor: ActsOn, stamps_s: Array, error: Callable[[Array], Array], log: Log) -> StampShift:
     """error: (g, n, 3) [m] of the rows at times (g, n), one line for every shift."""
     most = min(MOST_S, (1.0 - LEAST_INSIDE) * log.duration_s)
     first, last = log.time_s[0], log.time_s[-1]
@@ -103,7 +103,7 @@ def _best(sensor: Target, stamps_s: Array, error: Callable[[Array], Array], log:
         centre = float(grid[best])
         grid = centre + step * np.linspace(-1.0, 1.0, 2 * FINER + 1)
         step /= FINER
-    return Shift(sensor, centre, float(found[best]))
+    return StampShift(sensor, centre, float(found[best]))
 
 
 def _medians(values: Array, inside: NDArray[np.bool_]) -> Array:

@@ -28,7 +28,7 @@ from scipy.stats import t
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled
-from syncline_design.diagnosis.noise import NoiseLevel, Sensor, white_covariance
+from syncline_design.diagnosis.noise import NoiseLevel, SensorKey, white_covariance
 from syncline_design.diagnosis.positive import inverse as inverse_of
 from syncline_design.diagnosis.positive import pseudo_inverse, solution
 from syncline_design.diagnosis.spans import span_of
@@ -37,8 +37,8 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.normal import NORMAL_95, OF_MEDIAN_DEVIATION
 
-Channel = tuple[Sensor, int]
-SURVEY: Sensor = ("", "target")  # channel of the targets' survey errors
+Channel = tuple[SensorKey, int]
+SURVEY: SensorKey = ("", "target")  # channel of the targets' survey errors
 WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
 INSIDE = 12  # blocks of a part of the log in which an effect acts alone
@@ -359,7 +359,7 @@ class States:
     def _limits(self, level: NoiseLevel) -> Array:
         """Most that a channel's variance may be, over the spec's."""
         structure = self.data.structure
-        most: dict[Sensor, float] = {SURVEY: 1.0} | {
+        most: dict[SensorKey, float] = {SURVEY: 1.0} | {
             w.sensor: max(x, 1.0) ** 2 for w, x in zip(structure.white, level.factor, strict=True)
         }
         for part, slow in zip(structure.slow, level.slow, strict=True):

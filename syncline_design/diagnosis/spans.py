@@ -9,19 +9,19 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Candidate, Signature
 from syncline_design.effects.record import (
     NOTHING,
+    ActsOn,
     Array,
     Departures,
     Effect,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Span:
+class StampSpan:
     """An effect at work from one stamp to another, both included [s]."""
 
     effect: Effect
@@ -32,7 +32,7 @@ class Span:
         """1 inside, 0 outside (n,)."""
         return ((time_s >= self.from_s) & (time_s <= self.to_s)).astype(float)
 
-    def depart(self, rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+    def depart(self, rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
         """What the effect does, inside; nothing outside."""
         inside = self.mask(rows.time_s)
         found = self.effect.depart(rows, values, sensor, rng)
@@ -44,7 +44,7 @@ class Span:
             }
         )
 
-    def sensitivity(self, rows: StageRows, values: Values, sensor: Target) -> Array:
+    def sensitivity(self, rows: StageRows, values: Values, sensor: ActsOn) -> Array:
         """Its slopes, zero outside."""
         assert self.effect.sensitivity is not None
         inside = self.mask(rows.time_s)[:, None, None]
@@ -56,13 +56,13 @@ class Span:
         return replace(self.effect, depart=self.depart, sensitivity=self.sensitivity)
 
 
-def span_of(effect: Effect) -> Span | None:
+def span_of(effect: Effect) -> StampSpan | None:
     """The stretch that an effect is cut to."""
     own = getattr(effect.depart, "__self__", None)
-    return own if isinstance(own, Span) else None
+    return own if isinstance(own, StampSpan) else None
 
 
-def cut_to(span: Span, found: Signature, time_s: Array) -> Signature:
+def cut_to(span: StampSpan, found: Signature, time_s: Array) -> Signature:
     """Another effect's signature in the same stretch."""
     one = found.candidate
     effect = replace(span, effect=one.effect).cut

@@ -41,7 +41,7 @@ class Windows:
 
 
 @dataclass(frozen=True, slots=True)
-class Sums:
+class BlockSums:
     """Sums up to each block (B + 1, ...): X'WX, X'We of the remainder and of drawn ones, e'We and
     components compared; blocks' ends."""
 
@@ -65,7 +65,7 @@ def cumulated(part: Array, edges: Array) -> Array:
     return found
 
 
-def _lengths(sums: Sums) -> list[int]:
+def _lengths(sums: BlockSums) -> list[int]:
     blocks = len(sums.first) - 1
     least = max(1, math.ceil(LEAST_ROWS * blocks / sums.first[-1]))
     found, length = [], float(least)
@@ -75,7 +75,7 @@ def _lengths(sums: Sums) -> list[int]:
     return sorted(set(found))
 
 
-def scanned(sums: Sums, width: int) -> Iterator[Windows]:
+def scanned(sums: BlockSums, width: int) -> Iterator[Windows]:
     """All windows, length by length; the noise of a length is at least that of the shorter ones."""
     lengths = _lengths(sums)
     blocks = len(sums.first) - 1
@@ -125,7 +125,7 @@ def _chances(
     return log_p
 
 
-def _beside(sums: Sums, length: int) -> tuple[Array, Array]:
+def _beside(sums: BlockSums, length: int) -> tuple[Array, Array]:
     """Mean square next to every window, on its louder side, and the components it is of."""
     blocks = len(sums.first) - 1
     first = np.arange(blocks - length + 1)
@@ -141,7 +141,7 @@ def _beside(sums: Sums, length: int) -> tuple[Array, Array]:
     return found, known
 
 
-def _without_one(sums: Sums, length: int, which: NDArray[np.int64], width: int) -> Array:
+def _without_one(sums: BlockSums, length: int, which: NDArray[np.int64], width: int) -> Array:
     """The least b' M b of some windows without any one of their blocks; of one block none."""
     normal = sums.normal[which + length] - sums.normal[which]
     score = sums.score[which + length, :1] - sums.score[which, :1]

@@ -35,13 +35,13 @@ from syncline_design.diagnosis.noise import (
     white_covariance,
 )
 from syncline_design.diagnosis.scores import clean_errors
-from syncline_design.diagnosis.spans import Span, cut_to, cuttable
+from syncline_design.diagnosis.spans import StampSpan, cut_to, cuttable
 from syncline_design.diagnosis.stretch_windows import (
     ALONE,
     DOUBT,
     LEAST_ROWS,
     PLACES,
-    Sums,
+    BlockSums,
     Windows,
     cumulated,
     scanned,
@@ -167,7 +167,7 @@ def _whitened(data: Data, drawn: Array, model: Model) -> tuple[Array, Array]:
     return root, np.einsum("nij,dnj->dni", root, every)
 
 
-def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> Sums:
+def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> BlockSums:
     root, error = whitened
     columns = root @ np.nan_to_num(s.columns)
     n = error.shape[1]
@@ -180,10 +180,10 @@ def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> Sums:
         np.sum(np.any(root != 0.0, axis=2), axis=1).astype(float),
     )
     normal, score, square, rows = (cumulated(part, edges) for part in parts)
-    return Sums(normal, score, square, rows, edges, data.view.log.time_s)
+    return BlockSums(normal, score, square, rows, edges, data.view.log.time_s)
 
 
-def _hits(sums: Sums, windows: Sequence[Windows]) -> Iterator[_Hit]:
+def _hits(sums: BlockSums, windows: Sequence[Windows]) -> Iterator[_Hit]:
     """The window in which a candidate is clearest, if that is at least a doubt."""
     least = min((float(np.min(one.log_p)) for one in windows), default=0.0)
     if least >= math.log(DOUBT):
@@ -240,7 +240,7 @@ def _seldom(one: Candidate) -> tuple[bool, int, int]:
 def _fitted(data: Data, model: Model, white: Precision, s: Signature, hit: _Hit) -> _Fit | None:
     """One candidate in a window beside the model's effects, in the spec's white noise."""
     view = data.view
-    cut = cut_to(Span(s.candidate.effect, hit.from_s, hit.to_s), s, view.log.time_s)
+    cut = cut_to(StampSpan(s.candidate.effect, hit.from_s, hit.to_s), s, view.log.time_s)
     own = Acting(cut.candidate.effect, s.candidate.sensor, s.candidate.stage,
                  zero_values(s.candidate.effect))  # fmt: skip
     before = model.error
@@ -266,7 +266,7 @@ def _usual_gap_s(time_s: Array) -> float:
 
 
 def _reaches(
-    data: Data, s: Signature, sums: Sums, windows: Sequence[Windows]
+    data: Data, s: Signature, sums: BlockSums, windows: Sequence[Windows]
 ) -> Iterator[ShownSize]:
     """Size by length: sqrt(T) + 1.645 standard uncertainties, where nearly all places show it."""
     blocks = len(sums.first) - 1

@@ -31,7 +31,7 @@ FAR = 1.6  # root mean square of a row's whitened components, from where on a ro
 REWEIGHTED = 1
 LEAST_WEIGHT = 1e-3
 Seen = NDArray[np.bool_]
-Label = tuple[str, str, int, str]  # effect, sensor, stage, parameter
+TermLabel = tuple[str, str, int, str]  # effect, sensor, stage, parameter
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Sufficient:
     of time, and of targets where they are few.
     """
 
-    labels: tuple[Label, ...]
+    labels: tuple[TermLabel, ...]
     normal: Array
     score: Array
     square: float
@@ -139,7 +139,7 @@ def _freed(
     data: Data,
     model: Model,
     states: States,
-    labels: tuple[Label, ...],
+    labels: tuple[TermLabel, ...],
     every: Array,
     width: int,
     point: Array,

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 from syncline_design.diagnosis.result import Estimate, Finding
 from syncline_design.effects import plain_delay
-from syncline_design.logs.log import Kind
+from syncline_design.logs.log import LogKind
 from syncline_design.model.figure_text import format_estimate
 
 SPREADS = 3.0  # standard deviations by which the two may differ
 LEAST_S = 1e-3  # and at least this much: stamps of two systems agree no better
 
 
-def with_system_delay(found: Sequence[Finding], kind: Kind) -> tuple[Finding, ...]:
+def with_system_delay(found: Sequence[Finding], kind: LogKind) -> tuple[Finding, ...]:
     """The findings of a log of pose pairs, with equal delays of place and attitude joined.
 
     The joined value is the mean of both, weighted by their variances.

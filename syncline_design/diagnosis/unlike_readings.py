@@ -23,7 +23,7 @@ from syncline_design.diagnosis.motion_scatter import (
     own_share,
     variances_of,
 )
-from syncline_design.diagnosis.noise import Sensor, Structure, White, white_covariance
+from syncline_design.diagnosis.noise import SensorKey, Structure, White, white_covariance
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
@@ -48,7 +48,7 @@ class Unlike:
     gain: nat that this saves beside the spec's noise.
     """
 
-    sensor: Sensor
+    sensor: SensorKey
     growth: tuple[float, ...]
     spread: float
     gain: float
@@ -79,7 +79,7 @@ def with_unlike(data: Data, found: tuple[Unlike, ...]) -> Data:
     return replace(uneven, axes=data.axes, noisier=data.noisier, explained=data.explained)
 
 
-def _slopes(data: Data) -> dict[Sensor, Array]:
+def _slopes(data: Data) -> dict[SensorKey, Array]:
     """What one standard deviation of every reading does to the error [m], (n, 3, k) a sensor."""
     stated = dict(channels(data.view))
     return {
@@ -123,7 +123,7 @@ def _variances(data: Data, model: Model, slopes: list[Array]) -> tuple[Array, Ar
     return variances_of(normal, right), left, seen
 
 
-def _judged(sensor: Sensor, value: Array, left: Array, seen: Array) -> Unlike | None:
+def _judged(sensor: SensorKey, value: Array, left: Array, seen: Array) -> Unlike | None:
     """Whether one reading is louder than the spec, and than another one, beyond chance."""
     from scipy.stats import t
 
@@ -164,7 +164,7 @@ def _is_steady(data: Data, model: Model, slopes: Array, one: Unlike) -> bool:
 
 
 def _saved(
-    structure: Structure, data: Data, model: Model, slopes: dict[Sensor, Array], one: Unlike
+    structure: Structure, data: Data, model: Model, slopes: dict[SensorKey, Array], one: Unlike
 ) -> float:
     """nat that a size for each reading saves over the best one size for all of them."""
     axes = list(data.axes)

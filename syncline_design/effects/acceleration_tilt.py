@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import GRAVITY_MPS2, antenna_to_object, rotate
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,7 +15,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -30,17 +30,17 @@ def _tilt(rows: StageRows) -> Array:
     return rotate(np.swapaxes(rows.rotation, 1, 2), lean)
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured R = R exp(S(gain times the tilt))."""
     return Departures(attitude_rotation_rad=values["gain"] * _tilt(rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d gain = R (tilt x q) [m]; (n, 3, 1)."""
     return rotate(rows.rotation, np.cross(_tilt(rows), antenna_to_object(rows)))[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|gain| omega v / g: the tilt of the platform's hardest turn."""
     p = stage.platform
     tilt = p.v_max_mps * p.omega_max_radps / GRAVITY_MPS2

@@ -10,12 +10,12 @@ import numpy as np
 from syncline_design.effects import registry
 from syncline_design.effects.record import (
     NOTHING,
+    ActsOn,
     Basis,
     Contribution,
     Departures,
     Effect,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.effects.underway import OF_CAUSE
@@ -33,7 +33,7 @@ class Acting:
     """One effect where it acts: the record, its sensor, the place of its stage, values in SI."""
 
     effect: Effect
-    sensor: Target
+    sensor: ActsOn
     stage: int
     values: Values
 

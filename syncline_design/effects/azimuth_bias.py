@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import column, ranging_vector, rotate
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,24 +15,23 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured azimuth = true + bias [rad]."""
     return Departures(azimuth_rad=column(values["bias_rad"], rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d bias = R (z x b), z down [m/rad]; (n, 3, 1)."""
     turned = np.cross(np.array([0.0, 0.0, 1.0]), ranging_vector(rows))
     return rotate(rows.rotation, turned)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|bias| of the line of sight."""
     return Contribution(sight_rad=abs(values["bias_rad"]))
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import ranging_vector, rotate, row_vector
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,26 +15,25 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """beta [rad], body axes: the true mounting is the spec's times exp(S(beta))."""
     return Departures(
         bearing_rotation_rad=row_vector(values["x_rad"], values["y_rad"], values["z_rad"])
     )
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d beta_k = -R (e_k x b) [m/rad]; (n, 3, 3)."""
     b = ranging_vector(rows)
     return np.stack([-rotate(rows.rotation, np.cross(axis, b)) for axis in np.eye(3)], axis=-1)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|beta| of the line of sight."""
     angle = float(np.linalg.norm([values["x_rad"], values["y_rad"], values["z_rad"]]))
     return Contribution(sight_rad=angle)

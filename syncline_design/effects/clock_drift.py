@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import elapsed, shift_slope, shifted
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -12,23 +13,22 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """stamp = true + rate (t - t0), so mu = -rate (t - t0), t0 the mission's start."""
     return shifted(sensor, -values["rate"] * elapsed(rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d rate = -V, -W or V + W times (t - t0) [m]; (n, 3, 1)."""
     return (-shift_slope(rows, sensor) * elapsed(rows)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau grows by |rate| times the mission's duration."""
     return Contribution(tau_s=abs(values["rate"]) * basis.horizon.duration_s)
 

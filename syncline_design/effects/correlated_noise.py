@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import wander
 from syncline_design.effects.record import (
+    ActsOn,
     Basis,
     Contribution,
     Departures,
@@ -13,7 +14,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -21,7 +21,7 @@ from syncline_design.model.system import Stage
 AXES = np.ones(3)
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """The antenna reading wanders by a first-order Gauss-Markov process per axis."""
     if rng is None:
         return Departures()
@@ -29,7 +29,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     return Departures(position_m=values["std_m"] * wander(rows, values["time_constant_s"], draws))
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """sqrt(3) std: one standard deviation, as the sensor's own term."""
     return Contribution(systematic_m=values["std_m"] * float(np.linalg.norm(AXES)))
 

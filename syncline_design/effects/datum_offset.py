@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import row_vector
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -16,23 +17,22 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """surveyed object = true + offset [m], NED."""
     return Departures(target_m=row_vector(values["north_m"], values["east_m"], values["down_m"]))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d offset = -I; (n, 3, 3)."""
     return np.broadcast_to(-np.eye(3), (len(rows), 3, 3))
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|offset|."""
     return Contribution(
         systematic_m=math.hypot(values["north_m"], values["east_m"], values["down_m"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import antenna_velocity, shifted, sweep_velocity
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -12,7 +13,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
     by_sound,
 )
@@ -21,18 +21,18 @@ from syncline_design.model.system import Stage
 SOUND_SPEED_MPS = 1500.0
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """Data are older than their stamp by a share of the way's time: mu = -share r / c."""
     return shifted("ranging", -values["share"] * rows.range_m / SOUND_SPEED_MPS)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d share = (V + W) r / c [m]; (n, 3, 1)."""
     moved = antenna_velocity(rows) + sweep_velocity(rows)
     return (moved * (rows.range_m / SOUND_SPEED_MPS)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau of the ranging grows by |share| d / c."""
     return Contribution(tau_s=abs(values["share"]) * basis.distance_m / SOUND_SPEED_MPS)
 

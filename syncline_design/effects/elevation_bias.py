@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import column, rotate
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,18 +15,17 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured elevation = true + bias [rad]."""
     return Departures(elevation_rad=column(values["bias_rad"], rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d bias = R r dn/del [m/rad]; (n, 3, 1)."""
     sin_el = np.sin(rows.elevation_rad)
     slope = np.stack(
@@ -39,7 +39,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return rotate(rows.rotation, rows.range_m[:, None] * slope)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|bias| of the line of sight."""
     return Contribution(sight_rad=abs(values["bias_rad"]))
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import antenna_velocity, rotate
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,7 +15,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -57,7 +57,7 @@ def _turned_back(turn: Array, vector: Array) -> Array:
     return back
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """The antenna reading lags by a first-order low pass, of the path itself where it is known."""
     time_constant_s = values["time_constant_s"]
     if rows.lagged is None or time_constant_s <= 0.0:  # what a fit may try has no past
@@ -66,12 +66,12 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
     return Departures(position_m=place + rotate(turn, rows.antenna_m))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d T = -V at T = 0 [m/s]; (n, 3, 1)."""
     return -antenna_velocity(rows)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """No motion lags by more than a latency of T would: |M| <= 1, so |y - x| <= T |V|."""
     return Contribution(tau_s=abs(values["time_constant_s"]))
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import GRAVITY_MPS2, specific_force
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -16,24 +17,23 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """true lever arm = spec + (x f_x, y f_y, z f_z) [m], body, f the specific force."""
     bend = np.array([values["x"], values["y"], values["z"]])
     return Departures(ranging_m=bend * specific_force(rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d C_k = -R e_k f_k [m/s2]; (n, 3, 3)."""
     return -rows.rotation * specific_force(rows)[:, None, :]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """The sag of the tilt at which it is largest, and the bend of the platform's hardest turn.
 
     g sqrt((z cos t)^2 + (max(x, y) sin t)^2), t up to the horizon's tilt, + max(x, y, z) v omega.

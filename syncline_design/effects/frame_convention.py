@@ -9,6 +9,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -17,7 +18,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Undoing,
     Values,
 )
@@ -27,14 +27,14 @@ from syncline_design.model.system import Stage
 # up: height in the down column; yaw_sign, azimuth_sign, elevation_sign: turned round; yaw_180:
 # facing backwards; transposed: NED to body for body to NED; radians: written where degrees are due;
 # degrees: written where radians are due.
-CHOICES: Mapping[Target, tuple[str, ...]] = {
+CHOICES: Mapping[ActsOn, tuple[str, ...]] = {
     "position": ("enu", "up"),
     "attitude": ("yaw_sign", "yaw_180", "transposed", "enu", "radians", "degrees"),
     "ranging": ("azimuth_sign", "elevation_sign", "radians", "degrees"),
 }
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     convention = str(values["convention"])
     if sensor == "position":
         return _position(rows, convention)
@@ -79,7 +79,7 @@ def _ranging(rows: StageRows, convention: str) -> Departures:
 _UNIT = {"radians": math.pi / 180.0, "degrees": 180.0 / math.pi}
 
 
-def _mended(columns: Array, sensor: Target, convention: str) -> Array:
+def _mended(columns: Array, sensor: ActsOn, convention: str) -> Array:
     """The columns of a sensor brought back to the package's conventions."""
     if sensor == "position":
         flipped: Array = columns * np.array([1.0, 1.0, -1.0])
@@ -116,7 +116,7 @@ def _mended_bearing(bearing: Array, convention: str) -> Array:
     return mended
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """Twice what is turned round: such a fault is mended, not budgeted.
 
     Positions: the antenna's distance from the origin, at most extent + d + arms; attitude: d and

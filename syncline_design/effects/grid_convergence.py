@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -15,13 +16,12 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """surveyed object = true turned by gamma about down, at the local origin."""
     cos, sin = math.cos(values["rotation_rad"]), math.sin(values["rotation_rad"])
     north, east = rows.target_m[:, 0], rows.target_m[:, 1]
@@ -31,12 +31,12 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
     return Departures(target_m=moved)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d gamma = -z x p = (p_east, -p_north, 0) [m/rad]; (n, 3, 1)."""
     return -np.cross(np.array([0.0, 0.0, 1.0]), rows.target_m)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|gamma| times the extent, the farthest that an object lies from the origin."""
     return Contribution(systematic_m=abs(values["rotation_rad"]) * basis.horizon.extent_m)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -13,13 +14,12 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """surveyed object = true (1 + scale), horizontally, about the local origin."""
     return Departures(target_m=values["scale"] * _level(rows))
 
@@ -30,12 +30,12 @@ def _level(rows: StageRows) -> Array:
     return level
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d scale = -(p_north, p_east, 0) [m]; (n, 3, 1)."""
     return -_level(rows)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|scale| times the extent, the farthest that an object lies from the origin."""
     return Contribution(systematic_m=abs(values["scale"]) * basis.horizon.extent_m)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import down_axis_sweep, row_vector
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -12,23 +13,22 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured yaw = true + bias [rad]."""
     return Departures(attitude_euler_rad=row_vector(0.0, 0.0, values["bias_rad"]))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d bias = z x R q [m/rad]; (n, 3, 1)."""
     return down_axis_sweep(rows)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|bias|."""
     return Contribution(turn_rad=abs(values["bias_rad"]))
 

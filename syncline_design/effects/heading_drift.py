@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import down_axis_sweep, elapsed
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,25 +15,24 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured yaw = true + rate (t - t0) [rad]."""
     added = np.zeros((len(rows), 3))
     added[:, 2] = values["rate_radps"] * elapsed(rows)
     return Departures(attitude_euler_rad=added)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d rate = (z x R q) (t - t0) [m s/rad]; (n, 3, 1)."""
     return (down_axis_sweep(rows) * elapsed(rows)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|rate| times the mission's duration."""
     return Contribution(turn_rad=abs(values["rate_radps"]) * basis.horizon.duration_s)
 

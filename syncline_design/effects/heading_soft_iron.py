@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.kinematics import heading_departure, heading_slope
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,23 +15,22 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured yaw = true + D sin(2 yaw) + E cos(2 yaw) [rad]."""
     return heading_departure(rows, values, 2)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d (D, E) = (z x R q) (sin 2 yaw, cos 2 yaw) [m/rad]; (n, 3, 2)."""
     return heading_slope(rows, 2)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """sqrt(D^2 + E^2): the worst heading."""
     return Contribution(turn_rad=math.hypot(values["sin_rad"], values["cos_rad"]))
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.record import (
     OUTLIER_FACTOR,
+    ActsOn,
     Basis,
     Contribution,
     Departures,
@@ -15,13 +16,12 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """Noise times sqrt(nu / chi2_nu) per row; a share of the rows are outliers instead.
 
     An outlier is normal with ten times the spec's standard deviation: Student's tails and outliers
@@ -35,7 +35,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     return Departures(position_noise=np.where(struck, OUTLIER_FACTOR, factor) - 1.0)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """What the standard deviation of the mixture grows by, times sigma_p.
 
     Var = (1 - rate) nu / (nu - 2) + rate 100, over the spec's variance; infinite up to nu = 2.

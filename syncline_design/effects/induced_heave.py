@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -15,7 +16,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
     on_vessels,
 )
@@ -28,7 +28,7 @@ def _heave(rows: StageRows) -> Array:
     return slope
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """The down reading is off by the down component of (R - I) l."""
     lever = np.array([values["x_m"], values["y_m"], values["z_m"]])
     added = np.zeros((len(rows), 3))
@@ -36,14 +36,14 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
     return Departures(position_m=added)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d l: the down row only [-]; (n, 3, 3)."""
     slope = np.zeros((len(rows), 3, 3))
     slope[:, 2, :] = _heave(rows)
     return slope
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """hypot(x, y) sin t + |z| (1 - cos t), t the horizon's tilt: the largest at any tilt below."""
     tilt = basis.horizon.tilt_rad
     level = math.hypot(values["x_m"], values["y_m"])

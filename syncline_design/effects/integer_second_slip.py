@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import column, shifted
 from syncline_design.effects.record import (
+    ActsOn,
     Basis,
     Contribution,
     Departures,
@@ -11,7 +12,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Undoing,
     Values,
 )
@@ -20,12 +20,12 @@ from syncline_design.model.system import Stage
 MOST_S = 18  # GPS time less UTC
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """stamp = true + seconds, so mu = -seconds."""
     return shifted(sensor, column(-values["seconds"], rows))
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau of the sensor grows by |seconds|."""
     return Contribution(tau_s=abs(values["seconds"]))
 

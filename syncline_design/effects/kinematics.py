@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.record import Array, Departures, StageRows, Target, Values
+from syncline_design.effects.record import ActsOn, Array, Departures, StageRows, Values
 
 GRAVITY_MPS2 = 9.80665
 
@@ -102,7 +102,7 @@ def row_vector(x: float, y: float, z: float) -> Array:
     return np.array([[x, y, z]])
 
 
-def shifted(sensor: Target, shift_s: Array) -> Departures:
+def shifted(sensor: ActsOn, shift_s: Array) -> Departures:
     """mu of one sensor changed by shift_s (n,)."""
     if sensor == "position":
         return Departures(position_shift_s=shift_s)
@@ -111,7 +111,7 @@ def shifted(sensor: Target, shift_s: Array) -> Departures:
     return Departures(ranging_shift_s=shift_s)
 
 
-def shift_slope(rows: StageRows, sensor: Target) -> Array:
+def shift_slope(rows: StageRows, sensor: ActsOn) -> Array:
     """d error / d mu of a sensor [m/s], NED, (n, 3): V, W, or -(V + W) for the reference."""
     if sensor == "position":
         return antenna_velocity(rows)

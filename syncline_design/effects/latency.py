@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import antenna_velocity, column, sweep_velocity
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -12,13 +13,12 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """mu = -latency for every row of the sensor (paper, eq. state_space_y)."""
     shift = column(-values["latency_s"], rows)
     if sensor == "position":
@@ -28,7 +28,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
     return Departures(ranging_shift_s=shift)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d latency [m/s]: -V, -W, or V + W for the reference itself; (n, 3, 1)."""
     if sensor == "position":
         slope = -antenna_velocity(rows)
@@ -39,7 +39,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return slope[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau of the sensor grows by |latency|."""
     return Contribution(tau_s=abs(values["latency_s"]))
 

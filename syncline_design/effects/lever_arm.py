@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import row_vector
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,19 +15,18 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """dl [m], body axes: the true lever arm is the spec's plus dl."""
     offset = row_vector(values["x_m"], values["y_m"], values["z_m"])
     return Departures(antenna_m=offset) if sensor == "position" else Departures(ranging_m=offset)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d dl = R for the antenna, -R for the ranging sensor; (n, 3, 3).
 
     The antenna reads p + R (l_G + dl) while the spec takes off R l_G; the object is at
@@ -35,7 +35,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return rows.rotation if sensor == "position" else -rows.rotation
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|dl|."""
     return Contribution(
         systematic_m=float(np.linalg.norm([values["x_m"], values["y_m"], values["z_m"]]))

@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import antenna_to_object, rotate, row_vector
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -16,25 +17,24 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """alpha [rad], body axes: the true mounting is the spec's times exp(S(alpha))."""
     turned = row_vector(values["x_rad"], values["y_rad"], values["z_rad"])
     return Departures(attitude_rotation_rad=turned)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d alpha_k = R (e_k x q) [m/rad]; (n, 3, 3)."""
     q = antenna_to_object(rows)
     return np.stack([rotate(rows.rotation, np.cross(axis, q)) for axis in np.eye(3)], axis=-1)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|alpha|."""
     return Contribution(turn_rad=math.hypot(values["x_rad"], values["y_rad"], values["z_rad"]))
 

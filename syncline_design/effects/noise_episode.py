@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import elapsed
 from syncline_design.effects.record import (
+    ActsOn,
     Basis,
     Contribution,
     Departures,
@@ -15,13 +16,12 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """The sensor's noise is factor times the spec's from from_s to to_s after the start."""
     since = elapsed(rows)
     inside = (since >= values["from_s"]) & (since <= values["to_s"])
@@ -33,7 +33,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     return Departures(ranging_noise=extra)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """(factor - 1) times the sensor's terms: the error while it lasts."""
     part, more = getattr(stage, sensor, None), max(values["factor"] - 1.0, 0.0)
     if part is None:

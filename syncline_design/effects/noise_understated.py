@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.kinematics import column
 from syncline_design.effects.record import (
+    ActsOn,
     Basis,
     Contribution,
     Departures,
@@ -13,13 +14,12 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """The sensor's noise is factor times the spec's."""
     extra = column(values["factor"] - 1.0, rows)
     if sensor == "position":
@@ -29,7 +29,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     return Departures(ranging_noise=extra)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """(factor - 1) times the sensor's terms of the sensor error."""
     part = getattr(stage, sensor, None)
     if part is None:

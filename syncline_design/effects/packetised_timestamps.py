@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.kinematics import column, shift_slope, shifted
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,31 +15,30 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """mu = -age, age uniform on [0, interval]; its mean where nothing is drawn."""
     if rng is None:
         return shifted(sensor, column(-0.5 * values["interval_s"], rows))
     return shifted(sensor, -rng.uniform(0.0, values["interval_s"], len(rows)))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d mean error / d interval = -V/2 or -W/2 [m/s]; (n, 3, 1)."""
     return (-0.5 * shift_slope(rows, sensor))[:, :, None]
 
 
-def _spread(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _spread(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """Cov += interval^2 / 12 V V' [m2]: a uniform age; mean over standard deviation is sqrt(3)."""
     size = values["interval_s"] / math.sqrt(12.0)
     return (size * shift_slope(rows, sensor))[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau grows by the whole interval, the oldest that data can be."""
     return Contribution(tau_s=abs(values["interval_s"]))
 

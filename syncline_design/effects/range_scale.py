@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import column, ranging_vector, rotate
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -12,23 +13,22 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured r = true r (1 + scale)."""
     return Departures(range_scale=column(values["scale"], rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d scale = R b [m]; (n, 3, 1)."""
     return rotate(rows.rotation, ranging_vector(rows))[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|scale| d."""
     return Contribution(systematic_m=abs(values["scale"]) * stage.platform.distance_m)
 

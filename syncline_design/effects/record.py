@@ -22,7 +22,7 @@ from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Stage
 
 Array = NDArray[np.float64]
-Target = RoleName | Literal["target"]
+ActsOn = RoleName | Literal["target"]
 Values = Mapping[str, float]
 Rng = np.random.Generator | None
 
@@ -133,7 +133,7 @@ class Parameter:
     high: float
     unit: str = ""
     signed: bool = True
-    choices: Mapping[Target, tuple[str, ...]] = field(default_factory=dict)
+    choices: Mapping[ActsOn, tuple[str, ...]] = field(default_factory=dict)
     located: bool = False
     above: float = -math.inf
     most: float = math.inf
@@ -224,11 +224,11 @@ class Misfit:
         return f"one of {', '.join(self.known)}" if len(self.known) > 1 else self.known[0]
 
 
-Depart = Callable[[StageRows, Values, Target, Rng], Departures]
-Sensitivity = Callable[[StageRows, Values, Target], Array]
-Contribute = Callable[[Stage, Values, Target, Basis], Contribution]
-Spread = Callable[[StageRows, Values, Target], Array]
-Applies = Callable[[Stage, Target], bool]
+Depart = Callable[[StageRows, Values, ActsOn, Rng], Departures]
+Sensitivity = Callable[[StageRows, Values, ActsOn], Array]
+Contribute = Callable[[Stage, Values, ActsOn, Basis], Contribution]
+Spread = Callable[[StageRows, Values, ActsOn], Array]
+Applies = Callable[[Stage, ActsOn], bool]
 Unbudgeted = Callable[[Values], str]
 
 
@@ -237,7 +237,7 @@ def always_budgeted(values: Values) -> str:
     return ""
 
 
-def everywhere(stage: Stage, sensor: Target) -> bool:
+def everywhere(stage: Stage, sensor: ActsOn) -> bool:
     """Whether the stage has the sensor at all; the default of `Effect.applies`."""
     return sensor == "target" or getattr(stage, sensor) is not None
 
@@ -246,12 +246,12 @@ SOUNDS: Final = ("usbl", "mbes", "sbes", "sonar")
 VESSEL_WORDS: Final = ("vessel", "ship", "boat", "usv", "ferry")
 
 
-def by_sound(stage: Stage, sensor: Target) -> bool:
+def by_sound(stage: Stage, sensor: ActsOn) -> bool:
     """Whether the stage ranges by sound that goes there and comes back."""
     return stage.ranging is not None and stage.ranging.type.lower() in SOUNDS
 
 
-def on_vessels(stage: Stage, sensor: Target) -> bool:
+def on_vessels(stage: Stage, sensor: ActsOn) -> bool:
     """Whether a positioned stage floats, by its or its vehicle's name, or as it ranges by sound."""
     words = f"{stage.name} {stage.vehicle}".lower()
     named = any(word in words for word in VESSEL_WORDS)
@@ -276,8 +276,8 @@ class Undoing:
     instead_of: the effect that at such a value is this one, a latency of whole seconds.
     """
 
-    tried: Mapping[Target, tuple[str | float, ...]]
-    mend: Callable[[Array, Target, str], Array] | None = None
+    tried: Mapping[ActsOn, tuple[str | float, ...]]
+    mend: Callable[[Array, ActsOn, str], Array] | None = None
     instead_of: str = ""
 
 
@@ -323,7 +323,7 @@ class Effect:
     """
 
     name: str
-    sensors: tuple[Target, ...]
+    sensors: tuple[ActsOn, ...]
     kind: Literal["deterministic", "stochastic", "discrete"]
     parameters: tuple[Parameter, ...]
     sentence: str

@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.kinematics import shift_slope, shifted
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,7 +15,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -24,17 +24,17 @@ def _age(rows: StageRows) -> Array:
     return rows.azimuth_rad / (2.0 * math.pi)
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """A point at azimuth az was measured az / 2 pi of a period after its stamp: mu > 0."""
     return shifted("ranging", values["period_s"] * _age(rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d period = -(V + W) az / 2 pi [m/s]; (n, 3, 1)."""
     return (shift_slope(rows, "ranging") * _age(rows)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau of the ranging sensor grows by half a period, az counted from -pi to pi."""
     return Contribution(tau_s=0.5 * abs(values["period_s"]))
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import column, ranging_vector, rotate
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -16,7 +17,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -24,11 +24,11 @@ from syncline_design.model.system import Stage
 ACOUSTIC = ("usbl", "mbes")
 
 
-def _applies(stage: Stage, sensor: Target) -> bool:
+def _applies(stage: Stage, sensor: ActsOn) -> bool:
     return stage.ranging is not None and stage.ranging.type.lower() in ACOUSTIC
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured r = true r (1 + dc/c); measured sin(off normal) = true sin (1 + dc/c).
 
     dc: what the speed used is too high by.  A flat array, its normal along the sensor's down axis,
@@ -45,7 +45,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
     )
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d (dc/c) = R (b + r dn/d el d el), d el = -cot(el) [m]; (n, 3, 1).
 
     r dn/d el (-cot el) = r cot(el) [cos az sin el, sin az sin el, cos el].
@@ -58,7 +58,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return rotate(rows.rotation, bent)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """d sqrt(|e| (2 + e)), e = dc/c: a line of sight along the array's plane, the worst of all.
 
     There the direction is off by acos(1 - |e|) or acos(1 / (1 + e)).  At an angle a off the normal

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -13,28 +14,27 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
     on_vessels,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """The down reading is too small by sinkage (v / 1 m/s)^2 [m]."""
     added = np.zeros((len(rows), 3))
     added[:, 2] = -values["sinkage_m"] * np.sum(rows.velocity_mps**2, axis=1)
     return Departures(position_m=added)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d sinkage = -(v / 1 m/s)^2 down [-]; (n, 3, 1)."""
     slope = np.zeros((len(rows), 3, 1))
     slope[:, 2, 0] = -np.sum(rows.velocity_mps**2, axis=1)
     return slope
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|sinkage| (v_max / 1 m/s)^2."""
     return Contribution(systematic_m=abs(values["sinkage_m"]) * stage.platform.v_max_mps**2)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import elapsed
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,28 +15,27 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
     on_vessels,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """The down reading is too large by rate (t - t0) [m]: the level rose and was not told."""
     added = np.zeros((len(rows), 3))
     added[:, 2] = values["rate_mps"] * elapsed(rows)
     return Departures(position_m=added)
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d rate = (t - t0) down [s]; (n, 3, 1)."""
     slope = np.zeros((len(rows), 3, 1))
     slope[:, 2, 0] = elapsed(rows)
     return slope
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|rate| times the mission's duration."""
     return Contribution(systematic_m=abs(values["rate_mps"]) * basis.horizon.duration_s)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import shift_slope, shifted
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -12,25 +13,24 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """mu normal with standard deviation std_s, anew in every row."""
     if rng is None:
         return Departures()
     return shifted(sensor, values["std_s"] * rng.standard_normal(len(rows)))
 
 
-def _spread(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _spread(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """Cov += std^2 V V' or W W' [m2]: rank one along the motion."""
     return (values["std_s"] * shift_slope(rows, sensor))[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau grows by k std, k the coverage factor of every normal timing error's bound."""
     return Contribution(tau_s=basis.coverage_factor * abs(values["std_s"]))
 

@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.kinematics import elapsed, shift_slope, shifted
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -14,7 +15,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -26,17 +26,17 @@ def _after(rows: StageRows, values: Values) -> Array:
     return after
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """stamp = true + step from time_s on, so mu = -step there."""
     return shifted(sensor, -values["step_s"] * _after(rows, values))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d step = -V, -W or V + W from time_s on [m/s]; (n, 3, 1)."""
     return (-shift_slope(rows, sensor) * _after(rows, values)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """tau of the sensor grows by |step|, whenever in a mission it may happen."""
     return Contribution(tau_s=abs(values["step_s"]))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import bearing, column, rotate
 from syncline_design.effects.record import (
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -12,7 +13,6 @@ from syncline_design.effects.record import (
     Parameter,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -20,22 +20,22 @@ from syncline_design.model.system import Stage
 SOUND_SPEED_MPS = 1500.0
 
 
-def _applies(stage: Stage, sensor: Target) -> bool:
+def _applies(stage: Stage, sensor: ActsOn) -> bool:
     return stage.ranging is not None and stage.ranging.type.lower() == "usbl"
 
 
-def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """measured r = true r + c dt / 2 [m]."""
     return Departures(range_m=column(0.5 * SOUND_SPEED_MPS * values["delay_s"], rows))
 
 
-def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: ActsOn) -> Array:
     """d error / d dt = R n c / 2 [m/s]; (n, 3, 1)."""
     line = rotate(rows.rotation, bearing(rows.azimuth_rad, rows.elevation_rad))
     return 0.5 * SOUND_SPEED_MPS * line[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """|c dt / 2|."""
     return Contribution(systematic_m=0.5 * SOUND_SPEED_MPS * abs(values["delay_s"]))
 

@@ -10,6 +10,7 @@ import numpy as np
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import (
     NOTHING,
+    ActsOn,
     Array,
     Basis,
     Contribution,
@@ -17,25 +18,24 @@ from syncline_design.effects.record import (
     Effect,
     Rng,
     StageRows,
-    Target,
     Values,
 )
 from syncline_design.model.system import Stage
-from syncline_design.model.underway import Cause
+from syncline_design.model.underway import UnderwayCause
 
 
-def _travelled(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _travelled(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """Position and attitude are those of 2 r / c after the measurement."""
     later = values["share"] * rows.range_m
     return Departures(position_shift_s=later, attitude_shift_s=later)
 
 
-def _travels(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _travels(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """Both shifts are 2 d / c at most."""
     return Contribution(shift_s=values["share"] * basis.distance_m)
 
 
-def _relayed(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+def _relayed(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
     """A fix of what carries the next stage is 2 r / c older than its stamp.
 
     All three sensors are shifted alike, which leaves the stage's own pairs as they are: only the
@@ -45,7 +45,7 @@ def _relayed(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departu
     return Departures(position_shift_s=later, attitude_shift_s=later, ranging_shift_s=later)
 
 
-def _relays(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _relays(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """The next stage's position is late by 2 d / c at most."""
     return Contribution(relayed_s=values["share"] * basis.distance_m)
 
@@ -68,7 +68,7 @@ def _direction(given: Array | None, rng: np.random.Generator, count: int) -> Arr
     return np.asarray(drawn / np.where(length > 0.0, length, 1.0))
 
 
-def _bent(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _bent(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """The chord of the path between two fixes instead of the path, NED [m]."""
     if rng is None:
         return NOTHING
@@ -77,12 +77,12 @@ def _bent(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departur
     return Departures(position_m=rotate(rows.rotation, along) * off[:, None])
 
 
-def _bends(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _bends(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """a_max T^2 / 8."""
     return Contribution(systematic_m=values["size"])
 
 
-def _turned(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+def _turned(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """An even turn between two attitudes instead of the one there was [rad]."""
     if rng is None:
         return NOTHING
@@ -92,14 +92,14 @@ def _turned(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     )
 
 
-def _turns(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+def _turns(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
     """alpha_max T^2 / 8."""
     return Contribution(turn_rad=values["size"])
 
 
 _SOURCE = "linear interpolation errs by h^2 / 8 max |f''| (NIST DLMF 3.3.4)"
 
-OF_CAUSE: dict[Cause, Effect] = {
+OF_CAUSE: dict[UnderwayCause, Effect] = {
     "travel": Effect(
         name="sound under way",
         sensors=("ranging",),

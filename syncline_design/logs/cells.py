@@ -13,7 +13,7 @@ from syncline_design.effects.record import Array
 if TYPE_CHECKING:
     import polars as pl
 
-Stamps = NDArray[np.int64]
+StampArray = NDArray[np.int64]
 
 LONGEST_CELL = 200  # characters; no figure and no name of a target is longer
 NOTHING = ("", "nan", "NaN", "NAN", "NA", "N/A", "null")
@@ -115,7 +115,7 @@ def looks_like_a_date(text: pl.Series) -> bool:
     return bool(text.str.contains(ISO).any())
 
 
-def iso_times(text: pl.Series) -> tuple[Stamps, bool | None]:
+def iso_times(text: pl.Series) -> tuple[StampArray, bool | None]:
     """Nanoseconds since 1970 UTC, NO_TIME for empty cells; and whether they name their zone."""
     import polars as pl
 

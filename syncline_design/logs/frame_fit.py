@@ -55,7 +55,7 @@ class Laid:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class LaidTrack:
     """What is laid: places (n, 3), velocities (n, 3), body axes (n, 3, 3) or none."""
 
     place: Array
@@ -63,7 +63,7 @@ class Track:
     body: Array | None
 
 
-def laid(moved: Track, onto: Array, turns: Turns) -> Laid | None:
+def laid(moved: LaidTrack, onto: Array, turns: Turns) -> Laid | None:
     """The turn and shift that bring the first places onto the second (n, 3), pair by pair.
 
     None where they are in one frame already; StillError where the motion cannot tell the turn.
@@ -78,7 +78,7 @@ def laid(moved: Track, onto: Array, turns: Turns) -> Laid | None:
     if b.shape[0] < LEAST_POINTS:
         raise StillError(f"only {b.shape[0]} common positions")
     body = None if moved.body is None else moved.body[known]
-    own = Track(moved.place[known], moved.velocity[known], body)
+    own = LaidTrack(moved.place[known], moved.velocity[known], body)
     extent = _rms(b - b.mean(axis=0))
     if _rms(own.place - b) < max(ONE_FRAME * extent, ONE_FRAME * LEAST_EXTENT_M):
         return None
@@ -108,7 +108,9 @@ class _Fit:
     delay_s: float
 
 
-def _fitted(own: Track, onto: Array, begun: tuple[Array, Array], turns: Turns, width: int) -> _Fit:
+def _fitted(
+    own: LaidTrack, onto: Array, begun: tuple[Array, Array], turns: Turns, width: int
+) -> _Fit:
     """Gauss-Newton with so many figures beside turn and shift."""
     turn, shift = begun
     extra = np.zeros(4)
@@ -147,7 +149,7 @@ def _kabsch(a: Array, b: Array, turns: Turns) -> tuple[Array, Array]:
     return turn, middle_b - turn @ middle_a
 
 
-def _slope(own: Track, turn: Array, extra: Array, count: int) -> tuple[Array, Array]:
+def _slope(own: LaidTrack, turn: Array, extra: Array, count: int) -> tuple[Array, Array]:
     """The turned places with delay and lever, (n, 3), and how they move with every figure.
 
     Figures: turn (as many as are free), shift (3), delay, lever (3).

@@ -9,18 +9,18 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.logs.log import Kind
+from syncline_design.logs.log import LogKind
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.epochs import WEEK_SECONDS
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Stream
 from syncline_design.logs.readers.timelines import calendar
 from syncline_design.logs.roles import Offer, Part, Role, Sureness, offers_of, parts_of
-from syncline_design.logs.run_parts import Known, one_run
+from syncline_design.logs.run_parts import KnownRecording, one_run
 from syncline_design.logs.static_arms import ArmBeside, arms_beside
 from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Json, Named, Record, optional
+from syncline_design.machine.records import Json, Record, SchemaName, optional
 from syncline_design.model.figure_text import to_places
 from syncline_design.spec.edit import flow_text
 from syncline_design.spec.load import BadInput
@@ -124,7 +124,7 @@ class Proposal(Record):
     that is done to the values on the way.
     """
 
-    kind: Kind | None
+    kind: LogKind | None
     log: dict[str, Any]
     block: str
     parts: tuple[ProposedPart, ...]
@@ -136,7 +136,7 @@ class Proposal(Record):
 class LogInspection(Record):
     """What some files hold."""
 
-    schema: Annotated[str, Named(SCHEMA)]
+    schema: Annotated[str, SchemaName(SCHEMA)]
     version: str
     files: tuple[InspectedFile, ...]
     streams: tuple[InspectedStream, ...]
@@ -164,7 +164,7 @@ def inspect_logs(
     files, streams = [], []
     for path in paths:
         try:
-            recording = Known(open_recording(path))
+            recording = KnownRecording(open_recording(path))
             found = recording.streams()
         except BadInput as error:
             unread.append(UnreadFile(str(path), str(error)))
@@ -323,7 +323,7 @@ def _used(parts: dict[Role, Part], poses: bool) -> dict[Role, Part]:
     return kept
 
 
-def _kind(parts: dict[Role, Part], poses: bool) -> Kind:
+def _kind(parts: dict[Role, Part], poses: bool) -> LogKind:
     if "ranging" in parts:
         return "georeference"
     return "pose" if poses and is_pose_pair(parts) else "position"

@@ -14,7 +14,7 @@ from syncline_design.logs.stamps import usual_step_s
 from syncline_design.machine.quick_dataclass import dataclass
 
 GAP_FACTOR = 5.0  # rows further apart than this times the median interval are a gap
-Kind = Literal["georeference", "position", "pose"]
+LogKind = Literal["georeference", "position", "pose"]
 Rows = NDArray[np.signedinteger[Any]] | NDArray[np.bool_] | slice
 
 
@@ -78,7 +78,7 @@ class Log:
     thinned: rows of a very long log that are not in the windows kept of it.
     """
 
-    kind: Kind
+    kind: LogKind
     time_s: Array
     stages: tuple[StageLog, ...]
     truth_m: Array

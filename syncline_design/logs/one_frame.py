@@ -10,7 +10,7 @@ import numpy as np
 from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import ATTITUDE, POSITION, VELOCITY
-from syncline_design.logs.frame_fit import Laid, StillError, Track, laid, mean_turn
+from syncline_design.logs.frame_fit import Laid, LaidTrack, StillError, laid, mean_turn
 from syncline_design.logs.places import geodetic_to_ned
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.logs.refusals import refuse
@@ -19,7 +19,7 @@ from syncline_design.logs.smoothing import velocity_of
 from syncline_design.logs.stream_values import (
     ENU_TO_NED,
     GLOBE,
-    Values,
+    StreamValues,
     height_of,
     separation_of,
 )
@@ -32,7 +32,7 @@ TILTED: Final = 0.3  # what a turn about any axis has to leave of the rest, wher
 
 
 def on_one_datum(
-    several: Sequence[Values], parts: Mapping[Role, Part], values: Mapping[int, Values]
+    several: Sequence[StreamValues], parts: Mapping[Role, Part], values: Mapping[int, StreamValues]
 ) -> None:
     """Heights of all places above the ellipsoid; left out where one is above sea level only."""
     separation = separation_of(several)
@@ -57,7 +57,7 @@ def on_one_datum(
 
 
 def in_one_frame(
-    parts: Mapping[Role, Part], values: Mapping[int, Values], choice: LogChoice, pair: bool
+    parts: Mapping[Role, Part], values: Mapping[int, StreamValues], choice: LogChoice, pair: bool
 ) -> None:
     """Tested and reference in one local frame, where a stated origin does not see to it."""
     tested = values[id(parts["position"].offer)]
@@ -77,7 +77,7 @@ def in_one_frame(
         _lay(reference, tested, pair)
 
 
-def _with_fitting_axes(one: Values, globe: Values, origin: Array) -> None:
+def _with_fitting_axes(one: StreamValues, globe: StreamValues, origin: Array) -> None:
     """Axes that nothing tells, as places of WGS 84 show them: assumed, or north, east, down.
 
     One of the two has to leave far less than the other; a delay costs metres, wrong axes the way.
@@ -112,7 +112,7 @@ def _left(apart: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(known**2, axis=1)))) if known.shape[0] > 3 else float("nan")
 
 
-def _first_place(one: Values) -> Array:
+def _first_place(one: StreamValues) -> Array:
     place = np.stack([one.columns[n] for n in GLOBE], axis=1)
     heights = one.columns.get("height_m", np.zeros(place.shape[0]))
     whole = np.column_stack([place, heights])
@@ -123,7 +123,7 @@ def _first_place(one: Values) -> Array:
     return first
 
 
-def _about(one: Values, origin: Array, where: str) -> None:
+def _about(one: StreamValues, origin: Array, where: str) -> None:
     """Places in WGS 84 to north, east, down about an origin."""
     heights = one.columns.pop("height_m", None)
     place = np.column_stack(
@@ -141,7 +141,7 @@ def _about(one: Values, origin: Array, where: str) -> None:
     one.note(f"WGS 84 positions were made north, east, down about {where}, {at}")
 
 
-def _lay(reference: Values, tested: Values, pair: bool) -> None:
+def _lay(reference: StreamValues, tested: StreamValues, pair: bool) -> None:
     """The reference's frame onto the tested one's, where they are not the same already."""
     flat = _drop_idle_down(reference, tested)
     track = _track(reference, tested.time_ns)
@@ -167,12 +167,12 @@ def _lay(reference: Values, tested: Values, pair: bool) -> None:
         _lay_bodies(reference, tested, 0.0 if fit is None else fit.delay_s)
 
 
-def _know_north(*several: Values) -> bool:
+def _know_north(*several: StreamValues) -> bool:
     """Whether all frames are true to north: WGS 84, and those that call themselves so."""
     return all(one.offer.stream.frame in ("wgs84", "ned") for one in several)
 
 
-def _drop_idle_down(reference: Values, tested: Values) -> bool:
+def _drop_idle_down(reference: StreamValues, tested: StreamValues) -> bool:
     """A reference that only ever says one height tells none."""
     down = reference.columns.get(POSITION[2])
     idle = down is None or float(np.nanmax(down) - np.nanmin(down)) == 0.0
@@ -184,12 +184,12 @@ def _drop_idle_down(reference: Values, tested: Values) -> bool:
     return idle or POSITION[2] not in tested.columns
 
 
-def flattened(one: Values) -> Array:
+def flattened(one: StreamValues) -> Array:
     zero = np.zeros(one.time_ns.shape)
     return np.stack([one.columns[n] for n in POSITION[:2]] + [zero], axis=1)
 
 
-def _track(one: Values, stamps: Nanoseconds) -> Track:
+def _track(one: StreamValues, stamps: Nanoseconds) -> LaidTrack:
     """Its places, velocities and body axes at other stamps; NaN outside its own."""
     order = np.argsort(one.time_ns, kind="stable")
     base = int(one.time_ns[order[0]])
@@ -206,10 +206,10 @@ def _track(one: Values, stamps: Nanoseconds) -> Track:
     if one.has(ATTITUDE):
         nearest = order[np.clip(np.searchsorted(own, at), 0, own.shape[0] - 1)]
         body = euler_to_rotation(one.vectors(ATTITUDE)[nearest])
-    return Track(between(places), between(speeds), body)
+    return LaidTrack(between(places), between(speeds), body)
 
 
-def _move(one: Values, fit: Laid) -> None:
+def _move(one: StreamValues, fit: Laid) -> None:
     down = POSITION[2] in one.columns
     places = one.vectors(POSITION) if down else flattened(one)
     one.put(POSITION, places @ fit.turn.T + fit.shift_m)
@@ -224,7 +224,7 @@ def _move(one: Values, fit: Laid) -> None:
         one.put(ATTITUDE, rotation_to_euler(turned))
 
 
-def _say_laid(reference: Values, tested: Values, fit: Laid) -> None:
+def _say_laid(reference: StreamValues, tested: StreamValues, fit: Laid) -> None:
     turn = f"turned by {to_places(np.degrees(fit.heading_rad), 3)} deg about down"
     if _know_north(reference, tested):
         turn = "kept to its north"
@@ -238,7 +238,7 @@ def _say_laid(reference: Values, tested: Values, fit: Laid) -> None:
     )
 
 
-def _lay_bodies(reference: Values, tested: Values, delay_s: float) -> None:
+def _lay_bodies(reference: StreamValues, tested: StreamValues, delay_s: float) -> None:
     """A constant turn between the bodies, where their axes are not told."""
     moments = tested.time_ns - round(delay_s * 1e9)
     order = np.argsort(reference.time_ns, kind="stable")

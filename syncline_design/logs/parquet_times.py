@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from syncline_design.effects.record import Array
-from syncline_design.logs.cells import NO_TIME, Stamps
+from syncline_design.logs.cells import NO_TIME, StampArray
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,7 +23,7 @@ class FarTimeError(ValueError):
         self.row, self.found = row, found
 
 
-def calendar(column: pl.Series) -> Stamps:
+def calendar(column: pl.Series) -> StampArray:
     """Nanoseconds since 1970 (UTC, whatever the zone): 64 bits of them reach from 1677 to 2262."""
     import polars as pl
 

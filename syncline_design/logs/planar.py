@@ -18,12 +18,12 @@ from syncline_design.logs.columns import (
     VELOCITY,
     shown,
 )
-from syncline_design.logs.log import Kind
+from syncline_design.logs.log import LogKind
 
 DOWN, ELEVATION = 2, 2
 
 
-def filled(columns: dict[str, Array], prefixes: Sequence[str], kind: Kind) -> list[str]:
+def filled(columns: dict[str, Array], prefixes: Sequence[str], kind: LogKind) -> list[str]:
     """Add the level columns that a 2-D log leaves out; what was taken as zero, for people.
 
     Each of these may be missing if what belongs to it is there: down (beside north and east), roll

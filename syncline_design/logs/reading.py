@@ -26,7 +26,7 @@ from syncline_design.logs.columns import (
     shown,
 )
 from syncline_design.logs.derivatives import derived_rate, derived_velocity
-from syncline_design.logs.log import Kind, Log, LogTrack, StageLog
+from syncline_design.logs.log import Log, LogKind, LogTrack, StageLog
 from syncline_design.logs.magnitudes import demand_possible
 from syncline_design.logs.merging import merged
 from syncline_design.logs.pose_pairs import with_points
@@ -36,7 +36,7 @@ from syncline_design.logs.tables import LogTable, read_tables
 from syncline_design.logs.twins import without_twins
 from syncline_design.machine.quick_dataclass import dataclass
 
-Source = Literal["columns", "position", "reference"]  # of a velocity
+ColumnSource = Literal["columns", "position", "reference"]  # of a velocity
 
 LEAST_ROWS = 10
 
@@ -125,7 +125,7 @@ def _draft(tables: Sequence[LogTable], prefixes: Sequence[str]) -> _Draft:
 
 def _kind(
     draft: _Draft, prefixes: Sequence[str], needs_ranging: bool, pose_lever_m: float | None
-) -> Kind:
+) -> LogKind:
     last = prefixes[-1]
     ranging = last + RANGING[0] in draft.columns
     reference = any(n in draft.columns for n in REFERENCE)
@@ -139,7 +139,7 @@ def _kind(
     raise _missing(draft, [n for n in wanted if n not in draft.columns])
 
 
-def _demand_columns(draft: _Draft, prefixes: Sequence[str], kind: Kind) -> None:
+def _demand_columns(draft: _Draft, prefixes: Sequence[str], kind: LogKind) -> None:
     wanted = [prefixes[0] + n for n in POSITION]
     for prefix in prefixes:
         wanted += [prefix + n for n in ATTITUDE]
@@ -177,7 +177,7 @@ def _missing(draft: _Draft, names: Sequence[str]) -> Exception:
 
 
 def _complete_rows(
-    draft: _Draft, prefixes: Sequence[str], kind: Kind
+    draft: _Draft, prefixes: Sequence[str], kind: LogKind
 ) -> tuple[dict[str, Array], int]:
     """Rows with every needed value; components of a reference that is never there do not count."""
     needed = [prefixes[0] + n for n in POSITION]
@@ -199,7 +199,7 @@ def _log(
     draft: _Draft,
     stages: Sequence[str],
     prefixes: Sequence[str],
-    kind: Kind,
+    kind: LogKind,
     rejected: dict[str, int],
 ) -> Log:
     built = []
@@ -219,7 +219,7 @@ def _log(
     )
 
 
-def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -> StageLog:
+def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: LogKind) -> StageLog:
     time_s = draft.columns[TIME]
     euler = draft.vectors([prefix + n for n in ATTITUDE])
     antenna = draft.vectors([prefix + n for n in POSITION]) if first else None
@@ -249,12 +249,12 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
 
 
 def _velocity(
-    draft: _Draft, prefix: str, antenna: Array | None, kind: Kind, name: str
-) -> tuple[Array, Source]:
+    draft: _Draft, prefix: str, antenna: Array | None, kind: LogKind, name: str
+) -> tuple[Array, ColumnSource]:
     """Velocity columns, or the slope of reference or antenna positions, smoothed; its source."""
     time_s = draft.columns[TIME]
     if draft.has([prefix + n for n in VELOCITY]):
-        source: Source = "position" if draft.follows_position else "columns"
+        source: ColumnSource = "position" if draft.follows_position else "columns"
         return draft.vectors([prefix + n for n in VELOCITY]), source
     reference = draft.vectors(REFERENCE) if kind != "georeference" else None
     if reference is not None and np.all(np.isfinite(reference)):

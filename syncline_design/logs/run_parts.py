@@ -23,7 +23,7 @@ LEAST_SHARED: Final = 2  # streams of one name; files of one stream each are tol
 SHARED: Final = 0.5  # of the streams of the poorer file
 
 
-class Known:
+class KnownRecording:
     """A recording whose streams were listed once and are kept."""
 
     def __init__(self, recording: Recording) -> None:
@@ -88,7 +88,7 @@ def one_run(recordings: Sequence[Recording]) -> list[Recording]:
     """The recordings, those that are parts of one run as one, in the order of time."""
     groups: list[list[Recording]] = []
     for recording in recordings:
-        known = recording if isinstance(recording, Known) else Known(recording)
+        known = recording if isinstance(recording, KnownRecording) else KnownRecording(recording)
         for group in groups:
             if known.format == group[0].format and _alike(group[0].streams(), known.streams()):
                 group.append(known)

@@ -20,7 +20,7 @@ from syncline_design.logs.cells import (
     ONE_MARK,
     ONE_ZONE,
     BadCellError,
-    Stamps,
+    StampArray,
     as_labels,
     iso_times,
     looks_like_a_date,
@@ -57,7 +57,7 @@ class Clock:
     """
 
     seconds: Array | None
-    nanoseconds: Stamps | None
+    nanoseconds: StampArray | None
     zoned: bool | None = None
     spans: bool = False
 
@@ -142,7 +142,7 @@ class TextSource:
     def clock(self, name: str) -> Clock:
         place = [self.header.index(name)]
         seconds: list[Array] = []
-        dates: list[Stamps] = []
+        dates: list[StampArray] = []
         zoned: bool | None = None
         rows = 0
         last = self.how.body_line - 1
@@ -238,7 +238,7 @@ class TextSource:
 
     def _dates(
         self, block: delimited.RowBlock, place: int, text: pl.Series, zoned: bool | None
-    ) -> tuple[Stamps, bool | None]:
+    ) -> tuple[StampArray, bool | None]:
         try:
             stamps, zone = iso_times(text)
             if zoned is not None and zone is not None and zone != zoned:
@@ -367,7 +367,7 @@ class ParquetSource:
             return self._text_clock(name)
         return Clock(self._figures(name), None)
 
-    def _calendar(self, name: str) -> Stamps:
+    def _calendar(self, name: str) -> StampArray:
         try:
             return calendar(self._column(name))
         except FarTimeError as far:
@@ -381,7 +381,7 @@ class ParquetSource:
 
     def _text_clock(self, name: str) -> Clock:
         seconds: list[Array] = []
-        dates: list[Stamps] = []
+        dates: list[StampArray] = []
         zoned: bool | None = None
         for start, text in self._pieces(name):
             try:

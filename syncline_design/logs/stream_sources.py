@@ -36,7 +36,7 @@ from syncline_design.logs.sources import NANOSECONDS, Clock
 from syncline_design.logs.stream_times import UTC_CLOCK, on_one_timeline
 from syncline_design.logs.stream_values import (
     GLOBE,
-    Values,
+    StreamValues,
     all_values,
 )
 from syncline_design.spec.log_block import LogChoice
@@ -150,7 +150,7 @@ def _demand_parts(offers: Sequence[Offer], parts: set[Role]) -> None:
         )
 
 
-def _demand_places(parts: Mapping[Role, Part], values: Mapping[int, Values]) -> None:
+def _demand_places(parts: Mapping[Role, Part], values: Mapping[int, StreamValues]) -> None:
     """A stream may have positions by its kind and never a valid one."""
     placed: tuple[Role, ...] = ("position", "reference")
     for role in placed:
@@ -169,8 +169,11 @@ def _demand_places(parts: Mapping[Role, Part], values: Mapping[int, Values]) -> 
 
 
 def _clocks(
-    offers: Sequence[Offer], held: Mapping[int, Offer], several: Sequence[Values], choice: LogChoice
-) -> list[Values]:
+    offers: Sequence[Offer],
+    held: Mapping[int, Offer],
+    several: Sequence[StreamValues],
+    choice: LogChoice,
+) -> list[StreamValues]:
     """Streams that play no part but tell UTC or the geoid, of recordings that need it."""
     recordings = {id(one.offer.recording) for one in several}
     telling = [
@@ -186,7 +189,7 @@ def _clocks(
 
 
 def _source(
-    one: Values, roles: Sequence[Role], prefix: str, pair: bool, calendar: bool
+    one: StreamValues, roles: Sequence[Role], prefix: str, pair: bool, calendar: bool
 ) -> StreamSource:
     """Only the columns that belong to the parts that the stream plays."""
     columns: dict[str, Array] = {}
@@ -211,7 +214,7 @@ _ROLE_COLUMNS: Final[Mapping[Role, tuple[str, ...]]] = {
 }  # fmt: skip
 
 
-def _of_reference(one: Values, prefix: str, pair: bool) -> dict[str, Array]:
+def _of_reference(one: StreamValues, prefix: str, pair: bool) -> dict[str, Array]:
     """Places, and the motion at its own rate: its velocities, else the slope of its places."""
     columns = {n: one.columns[p] for n, p in zip(REFERENCE, POSITION, strict=True)
                if p in one.columns}  # fmt: skip

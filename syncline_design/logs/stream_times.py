@@ -19,7 +19,7 @@ from syncline_design.logs.readers.epochs import (
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Timeline
 from syncline_design.logs.readers.timelines import EARLIEST_NS
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.stream_values import Values
+from syncline_design.logs.stream_values import StreamValues
 from syncline_design.model.figure_text import to_places
 from syncline_design.spec.log_block import LogChoice
 
@@ -31,7 +31,7 @@ ASSUMED_GPS: Final = "taken as GPS time, which the file does not tell"
 TELL_CLOCK: Final = "log: {timeline: utc} if they are UTC"
 
 
-def on_one_timeline(several: Sequence[Values], choice: LogChoice) -> bool:
+def on_one_timeline(several: Sequence[StreamValues], choice: LogChoice) -> bool:
     """Bring the stamps onto UTC if any stream tells it; whether they are calendar times now.
 
     Streams that all count from the same unknown zero stay as they are.
@@ -59,7 +59,7 @@ def on_one_timeline(several: Sequence[Values], choice: LogChoice) -> bool:
     return True
 
 
-def _timeline(one: Values, choice: LogChoice) -> Timeline:
+def _timeline(one: StreamValues, choice: LogChoice) -> Timeline:
     told = one.offer.stream.timeline
     if told == "unknown" and choice.timeline is not None and not _counts_weeks(one):
         one.note(f"stamps are taken as {choice.timeline}, as the spec says")
@@ -67,13 +67,13 @@ def _timeline(one: Values, choice: LogChoice) -> Timeline:
     return told
 
 
-def _counts_weeks(one: Values) -> bool:
+def _counts_weeks(one: StreamValues) -> bool:
     stamps = one.offer.stream.stamps
     return stamps is not None and stamps.primary == WEEK_SECONDS
 
 
 def _with_weeks(
-    several: Sequence[Values], timelines: dict[int, Timeline], choice: LogChoice
+    several: Sequence[StreamValues], timelines: dict[int, Timeline], choice: LogChoice
 ) -> None:
     """Seconds of the week get their week: the spec's, or that of another file of the call.
 
@@ -96,7 +96,7 @@ def _with_weeks(
 
 
 def _week_beside(
-    one: Values, several: Sequence[Values], timelines: Mapping[int, Timeline]
+    one: StreamValues, several: Sequence[StreamValues], timelines: Mapping[int, Timeline]
 ) -> tuple[int | None, str]:
     """The week in which the stamps come nearest to another stream's."""
     own = one.time_ns[one.time_ns != UNSET]
@@ -118,7 +118,7 @@ def _gps_of(stamps: Nanoseconds, kind: Timeline) -> Nanoseconds:
     return stamps - TAI_MINUS_GPS_S * NANO if kind == "tai" else stamps
 
 
-def _as_utc(one: Values, kind: Timeline) -> None:
+def _as_utc(one: StreamValues, kind: Timeline) -> None:
     if kind == "utc":
         return
     known = one.time_ns[one.time_ns != UNSET]
@@ -131,7 +131,7 @@ def _as_utc(one: Values, kind: Timeline) -> None:
     one.note(f"{name} stamps were made UTC: {apart} s taken off (leap second table)")
 
 
-def _booted(one: Values, several: Sequence[Values]) -> None:
+def _booted(one: StreamValues, several: Sequence[StreamValues]) -> None:
     """Stamps since boot by the recording's own pairs of boot and UTC."""
     pairs = [
         other.columns[UTC_CLOCK].astype(np.int64) - other.time_ns
@@ -153,7 +153,7 @@ def _booted(one: Values, several: Sequence[Values]) -> None:
     )
 
 
-def _demand_one_zero(several: Sequence[Values], timelines: Mapping[int, Timeline]) -> None:
+def _demand_one_zero(several: Sequence[StreamValues], timelines: Mapping[int, Timeline]) -> None:
     kinds = {timelines[id(one)] for one in several}
     recordings = {id(one.offer.recording) for one in several}
     if kinds == {"boot"} and len(recordings) > 1:

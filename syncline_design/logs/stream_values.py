@@ -39,7 +39,7 @@ _BODIES: Final = {"flu": "forward, left, up", "frd": "forward, right, down"}
 
 
 @dataclass(slots=True)
-class Values:
+class StreamValues:
     """A stream's samples: stamps as in the file, canonical SI columns, and what was done to them.
 
     latitude_rad, longitude_rad, height_m stand as they are; everything else is local.  assumed:
@@ -69,7 +69,7 @@ class Values:
             self.notes.append(said)
 
 
-def all_values(offers: Sequence[Offer], choice: LogChoice) -> list[Values]:
+def all_values(offers: Sequence[Offer], choice: LogChoice) -> list[StreamValues]:
     """The samples of some streams, made canonical; every recording is gone through once."""
     recordings = {id(offer.recording): offer.recording for offer in offers}
     held: dict[tuple[int, str], list[Piece]] = {}
@@ -87,7 +87,7 @@ def all_values(offers: Sequence[Offer], choice: LogChoice) -> list[Values]:
     ]
 
 
-def values_of(offer: Offer, pieces: Sequence[Piece], choice: LogChoice) -> Values:
+def values_of(offer: Offer, pieces: Sequence[Piece], choice: LogChoice) -> StreamValues:
     """All samples of a stream, made canonical."""
     time_ns, raw = _collected(offer, pieces)
     columns: dict[str, Any] = {}
@@ -97,7 +97,7 @@ def values_of(offer: Offer, pieces: Sequence[Piece], choice: LogChoice) -> Value
             continue
         factor = suffix_unit(name)[0]
         columns[si_name(name)] = values * factor if factor != 1.0 else values
-    found = Values(offer, time_ns, columns)
+    found = StreamValues(offer, time_ns, columns)
     for words in offer.stream.notes:  # what its reader did
         found.note(words)
     frame, body = _axes(found, choice)
@@ -127,7 +127,7 @@ def _collected(offer: Offer, pieces: Sequence[Piece]) -> tuple[Nanoseconds, dict
     return np.concatenate([one.primary_ns for one in pieces]), figures
 
 
-def _axes(values: Values, choice: LogChoice) -> tuple[Frame, Body]:
+def _axes(values: StreamValues, choice: LogChoice) -> tuple[Frame, Body]:
     """Frame and body by the stream, else by the spec, else assumed and said."""
     stream = values.offer.stream
     frame, body = stream.frame, stream.body
@@ -156,7 +156,7 @@ def _to_frd(body: Body) -> Array:
     return FLU_TO_FRD if body == "flu" else np.eye(3)
 
 
-def _attitude(values: Values, frame: Frame, body: Body) -> Array | None:
+def _attitude(values: StreamValues, frame: Frame, body: Body) -> Array | None:
     """Roll, pitch, yaw from a quaternion; gives the rotations body to NED, where they are told."""
     if values.has(QUATERNION):
         from scipy.spatial.transform import Rotation
@@ -181,7 +181,7 @@ def _attitude(values: Values, frame: Frame, body: Body) -> Array | None:
     return None
 
 
-def _position(values: Values, frame: Frame) -> None:
+def _position(values: StreamValues, frame: Frame) -> None:
     if not values.has(XYZ):
         return
     values.put(POSITION, values.vectors(XYZ) @ _to_ned(frame).T)
@@ -197,7 +197,7 @@ def _position(values: Values, frame: Frame) -> None:
                 values.note(f"its origin moves by up to {to_places(moved, 1)} m within the log")
 
 
-def _velocity(values: Values, frame: Frame, body: Body, turn: Array | None) -> None:
+def _velocity(values: StreamValues, frame: Frame, body: Body, turn: Array | None) -> None:
     if values.has(VELOCITY):
         return
     if values.has(BODY_SPEED) and turn is not None:
@@ -209,13 +209,13 @@ def _velocity(values: Values, frame: Frame, body: Body, turn: Array | None) -> N
         values.note(f"velocities in {_FRAMES.get(frame, frame)} were made north, east, down")
 
 
-def _rates(values: Values, body: Body) -> None:
+def _rates(values: StreamValues, body: Body) -> None:
     if values.has(RATE) and body == "flu":
         values.put(RATE, values.vectors(RATE) @ FLU_TO_FRD.T)
         values.note("body rates (forward, left, up) were made forward, right, down")
 
 
-def height_of(values: Values, separation_m: float | None) -> bool | None:
+def height_of(values: StreamValues, separation_m: float | None) -> bool | None:
     """Give `height_m` above the ellipsoid, if the log knows it; whether it does, None without one.
 
     separation_m: geoid above ellipsoid, where another stream of the log tells it.
@@ -243,7 +243,7 @@ def height_of(values: Values, separation_m: float | None) -> bool | None:
     return False
 
 
-def separation_of(several: Sequence[Values]) -> float | None:
+def separation_of(several: Sequence[StreamValues]) -> float | None:
     """Geoid above ellipsoid [m] where one stream has both heights."""
     for one in several:
         columns: Mapping[str, Array] = one.columns

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from syncline_design.effects.record import Array
-from syncline_design.logs.cells import NO_TIME, Stamps
+from syncline_design.logs.cells import NO_TIME, StampArray
 from syncline_design.logs.columns import (
     TARGET_ID,
     TIME,
@@ -191,7 +191,7 @@ def _seconds(
     return clock.seconds * factor, None, ()
 
 
-def _since_midnight(stamps: Stamps) -> tuple[Array, int]:
+def _since_midnight(stamps: StampArray) -> tuple[Array, int]:
     """Seconds since the midnight (UTC) before the first stamp, which is exact to a nanosecond."""
     known = stamps != NO_TIME
     first = int(stamps[known].min()) if np.any(known) else 0

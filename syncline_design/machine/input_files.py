@@ -43,7 +43,7 @@ class FileRead(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FilePlace:
     """Where a name leads, all links followed: what is there, and its real path."""
 
     kind: str  # file, folder, other or `missing`
@@ -68,7 +68,7 @@ class FilesRead:
     """
 
     contents: dict[str, str] = field(default_factory=dict)
-    places: dict[str, Place] = field(default_factory=dict)
+    places: dict[str, FilePlace] = field(default_factory=dict)
     identities: dict[Identity, str] = field(default_factory=dict)
     outputs: list[Path] = field(default_factory=list)
 
@@ -143,15 +143,15 @@ def note_place(path: Path) -> None:
             noted.add(path, path.stat())
 
 
-def place_of(path: Path) -> Place:
+def place_of(path: Path) -> FilePlace:
     """Where a name leads now."""
     try:
         real = path.resolve()
         mode = real.stat().st_mode
     except (OSError, RuntimeError, ValueError):
-        return Place(MISSING)
+        return FilePlace(MISSING)
     kind = "file" if stat.S_ISREG(mode) else "folder" if stat.S_ISDIR(mode) else "other"
-    return Place(kind, real)
+    return FilePlace(kind, real)
 
 
 def note_content(path: Path, content: bytes, status: os.stat_result | None = None) -> None:

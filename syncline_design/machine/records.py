@@ -86,7 +86,7 @@ Unbounded = Annotated[float, _NullIsInfinite]  # may be infinite: unlimited, or 
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class SchemaName:
     """Of the `schema` key: only this name is taken, so that no other kind or version is read."""
 
     name: str

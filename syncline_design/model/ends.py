@@ -10,7 +10,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from syncline_design.model.system import Shape, Stage, System
+from syncline_design.model.system import ShareCurve, Stage, System
 
 
 def stage_ends(stage: Stage) -> tuple[Stage, ...]:
@@ -37,7 +37,7 @@ def at_distance(stage: Stage, distance_m: float) -> Stage:
     return replace(stage, platform=moved, ranging=there)
 
 
-def share_at(shape: Shape, place: float) -> float:
+def share_at(shape: ShareCurve, place: float) -> float:
     """The share of a shape at a place, a straight line between two; the outermost hold beyond."""
     before = shape[0]
     for here in shape:

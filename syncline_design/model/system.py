@@ -13,7 +13,7 @@ from syncline_design.model.roles import RoleName
 from syncline_design.model.timing import NO_ERROR, TimingError
 
 UTC = "utc"
-Shape = tuple[tuple[float, float], ...]  # place and share, rising in place; straight between
+ShareCurve = tuple[tuple[float, float], ...]  # place and share, rising in place; straight between
 
 
 class SimulationError(ValueError):
@@ -64,9 +64,9 @@ class Sensor:
     rate_hz: float | None = None
     sound_mps: float | None = None
     travels: bool = False
-    range_shape: Shape = ()
-    range_by_beam: Shape = ()
-    bearing_by_beam: Shape = ()
+    range_shape: ShareCurve = ()
+    range_by_beam: ShareCurve = ()
+    bearing_by_beam: ShareCurve = ()
 
 
 @dataclass(frozen=True, slots=True)

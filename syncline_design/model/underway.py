@@ -24,7 +24,7 @@ TRAVEL = "(v_max+d*omega_max)*2d/c"
 MOVED = "v_object*2d/c"
 PATH = "a_max*T^2/8"
 TURN = "alpha_max*T^2/8*d"
-Cause = Literal["travel", "object", "path", "turn"]
+UnderwayCause = Literal["travel", "object", "path", "turn"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Underway:
     interval_s: T, of an interpolated one.
     """
 
-    cause: Cause
+    cause: UnderwayCause
     stage: int
     role: RoleName
     sensor: Sensor

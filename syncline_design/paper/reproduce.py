@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Literal
 from syncline_design import __version__
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record
+from syncline_design.machine.records import Record, SchemaName
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
@@ -57,7 +57,7 @@ class PrintedCell(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Count(Record):
+class FigureCount(Record):
     """How many figures are printed, agree, are documented errata, differ."""
 
     printed: int
@@ -67,12 +67,12 @@ class Count(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Counts(Record):
+class CellCounts(Record):
     """The cells of the tau_crit tables, the figures in the text, the platforms and sensors."""
 
-    tau_crit: Count
-    text: Count
-    inputs: Count
+    tau_crit: FigureCount
+    text: FigureCount
+    inputs: FigureCount
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +83,11 @@ class Reproduction(Record):
     inputs: its platform and sensor figures against the catalog.
     """
 
-    schema: Annotated[str, Named(SCHEMA)]
+    schema: Annotated[str, SchemaName(SCHEMA)]
     version: str
     seed: int
     ok: bool
-    counts: Counts
+    counts: CellCounts
     cells: tuple[PrintedCell, ...]
     inputs: tuple[PrintedCell, ...]
     errata: tuple[Erratum, ...]
@@ -239,11 +239,11 @@ def tau_crit_cells(cells: Iterable[PrintedCell]) -> tuple[PrintedCell, ...]:
     return tuple(cell for cell in cells if cell.table in TAU_CRIT_TABLES)
 
 
-def _counts(cells: Iterable[PrintedCell], inputs: Iterable[PrintedCell]) -> Counts:
+def _counts(cells: Iterable[PrintedCell], inputs: Iterable[PrintedCell]) -> CellCounts:
     text = [cell for cell in cells if cell.table == "text"]
-    return Counts(_count(tau_crit_cells(cells)), _count(text), _count(inputs))
+    return CellCounts(_count(tau_crit_cells(cells)), _count(text), _count(inputs))
 
 
-def _count(cells: Iterable[PrintedCell]) -> Count:
+def _count(cells: Iterable[PrintedCell]) -> FigureCount:
     found = Counter(cell.status for cell in cells)
-    return Count(found.total(), found["agrees"], found["erratum"], found["differs"])
+    return FigureCount(found.total(), found["agrees"], found["erratum"], found["differs"])

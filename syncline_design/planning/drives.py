@@ -27,7 +27,7 @@ from syncline_design.planning.information import (
     with_shift,
 )
 from syncline_design.planning.legs import Leg, library, transition
-from syncline_design.planning.path import STEP_S, Course, States, joined, travelled
+from syncline_design.planning.path import STEP_S, CourseCommands, PathStates, joined, travelled
 from syncline_design.planning.planned_log import (
     Drive,
     apart,
@@ -36,7 +36,7 @@ from syncline_design.planning.planned_log import (
     planned_log,
     turned,
 )
-from syncline_design.planning.search import Told, arranged
+from syncline_design.planning.search import LegTold, arranged
 from syncline_design.planning.vehicle import Vehicle
 
 COMPUTED_HZ = 10.0  # rows that are computed; more rows a second count as less noise each
@@ -62,7 +62,7 @@ class World:
     def computed_hz(self) -> float:
         return min(self.rate_hz, COMPUTED_HZ)
 
-    def driven(self, courses: Sequence[Course]) -> Drive:
+    def driven(self, courses: Sequence[CourseCommands]) -> Drive:
         """A drive of courses, one a stage, all of one length."""
         step = 1.0 / self.computed_hz
         states = []
@@ -84,7 +84,7 @@ class World:
         factor = tuple(share * f for f in level.factor)
         return structure, NoiseLevel(factor, level.slow, level.time_constant_s, level.size)
 
-    def courses_of(self, stage: int, course: Course) -> list[Course]:
+    def courses_of(self, stage: int, course: CourseCommands) -> list[CourseCommands]:
         """One stage drives, the others hold."""
         return [
             course if k == stage else held(vehicle, len(course))
@@ -102,7 +102,7 @@ class World:
         turning = next((g for g in self.legs if g.name == "figure eight"), self.legs[0])
         return unknowns(self.view(self.driven(self.courses_of(turning.stage, turning.course))))
 
-    def looked_at(self, legs: Sequence[Leg]) -> tuple[Told, ...]:
+    def looked_at(self, legs: Sequence[Leg]) -> tuple[LegTold, ...]:
         """What each of some legs alone would tell, at four headings; all looked at as one log."""
         flown = []
         for leg in legs:
@@ -134,13 +134,13 @@ class World:
         twice[np.ix_(drifting, drifting)] = found[count:, count:]
         return found[:count, :count], cross + cross.T, twice
 
-    def _summed(self, leg: Leg, parts: Sequence[tuple[Array, Array, Array]]) -> Told:
+    def _summed(self, leg: Leg, parts: Sequence[tuple[Array, Array, Array]]) -> LegTold:
         vehicle = self.vehicles[leg.stage]
         path = travelled(vehicle, leg.course)
         turns_s = (transition(vehicle, 0.0).duration_s, transition(vehicle, math.pi).duration_s)
         moved = path.position_m[-1, :2] - path.position_m[0, :2]
         now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
-        return Told(
+        return LegTold(
             leg,
             now,
             once,
@@ -152,7 +152,7 @@ class World:
         )
 
 
-def _box(path: States) -> tuple[float, float, float, float]:
+def _box(path: PathStates) -> tuple[float, float, float, float]:
     (south, north), (west, east) = (
         (float(own.min() - own[0]), float(own.max() - own[0])) for own in path.position_m.T[:2]
     )
@@ -168,15 +168,17 @@ def _since(time_s: Array, ends: Sequence[int]) -> Array:
     return found
 
 
-def held(vehicle: Vehicle, steps: int) -> Course:
+def held(vehicle: Vehicle, steps: int) -> CourseCommands:
     """What a vehicle does while another one drives: hover, or wide circles, slowly."""
     speed = np.full(steps, vehicle.wait_mps)
     zero = np.zeros(steps)
-    return Course(speed, zero, zero, np.full(steps, 0.5 * vehicle.turn_radps(vehicle.wait_mps)))
+    return CourseCommands(
+        speed, zero, zero, np.full(steps, 0.5 * vehicle.turn_radps(vehicle.wait_mps))
+    )
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class DrivenLeg:
     """One leg in a whole drive: from when to when, and the heading it begins at [rad]."""
 
     leg: Leg
@@ -185,9 +187,11 @@ class Stretch:
     heading_rad: float
 
 
-def whole_drive(world: World, sequence: Sequence[Told]) -> tuple[tuple[Stretch, ...], list[Course]]:
+def whole_drive(
+    world: World, sequence: Sequence[LegTold]
+) -> tuple[tuple[DrivenLeg, ...], list[CourseCommands]]:
     """The legs one after the other with the turns between them: stretches and courses by stage."""
-    parts: list[list[Course]] = [[] for _ in world.vehicles]
+    parts: list[list[CourseCommands]] = [[] for _ in world.vehicles]
     heading, found, steps = 0.0, [], 0
     for placed in arranged(sequence):
         leg = placed.told.leg
@@ -199,7 +203,7 @@ def whole_drive(world: World, sequence: Sequence[Told]) -> tuple[tuple[Stretch, 
                 own.append(one)
             steps += len(course)
         heading = QUARTER * placed.heading + placed.told.turned_rad
-        found.append(Stretch(leg, begun * STEP_S, steps * STEP_S, QUARTER * placed.heading))
+        found.append(DrivenLeg(leg, begun * STEP_S, steps * STEP_S, QUARTER * placed.heading))
     return tuple(found), [joined(own) for own in parts]
 
 
@@ -208,10 +212,10 @@ def _wrapped(angle: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class WholeDrive:
     """A whole drive with the information of all unknowns after each of its legs."""
 
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[DrivenLeg, ...]
     driven: Drive
     view: Scene
     after: tuple[Array, ...]
@@ -219,7 +223,7 @@ class Outcome:
     noise: tuple[Structure, NoiseLevel]
 
 
-def outcome(world: World, sequence: Sequence[Told]) -> Outcome:
+def outcome(world: World, sequence: Sequence[LegTold]) -> WholeDrive:
     """The whole drive judged: information after every leg, from all rows up to its end."""
     stretches, courses = whole_drive(world, sequence)
     driven = world.driven(courses)
@@ -231,4 +235,4 @@ def outcome(world: World, sequence: Sequence[Told]) -> Outcome:
         in_force().check()
         rows = slice(0, int(np.searchsorted(view.log.time_s, one.to_s)))
         after.append(fisher(structure.rows(rows), level, slopes[rows]))
-    return Outcome(stretches, driven, view, tuple(after), slopes, (structure, level))
+    return WholeDrive(stretches, driven, view, tuple(after), slopes, (structure, level))

@@ -5,34 +5,34 @@ from __future__ import annotations
 from syncline_design.diagnosis.result import Diagnosis, Finding, Rival
 from syncline_design.effects import registry
 from syncline_design.model.system import System
-from syncline_design.planning.wanted import Asked, Named, Pair, PlanError
+from syncline_design.planning.wanted import EffectPair, NamedEffect, PlanError, PlanWanted
 
 SHARE = 0.2  # of the value that would turn a requirement: how well a blind spot is to be known
 
 
-def asked_of(system: System, found: Diagnosis) -> Asked:
+def asked_of(system: System, found: Diagnosis) -> PlanWanted:
     """The classes of a diagnosis; of one without, its causes; else what its log was blind to."""
     _demand_same(system, found)
     pairs = tuple(
-        Pair(_named(system, one), _named(system, rival), _sizes(one))
+        EffectPair(_named(system, one), _named(system, rival), _sizes(one))
         for one in found.findings
         if _moves(one.effect)
         for rival in one.aliases
         if _moves(rival.effect)
     )
     if pairs:
-        return Asked((), pairs)
+        return PlanWanted((), pairs)
     causes = [one for one in found.findings if one.material and _moves(one.effect)]
     if causes:
-        return Asked(tuple((_named(system, one), None) for one in causes))
-    blind: dict[Named, float | None] = {}
+        return PlanWanted(tuple((_named(system, one), None) for one in causes))
+    blind: dict[NamedEffect, float | None] = {}
     for spot in found.informative.blind_to:
         if _moves(spot.effect):
             name = _spelt(system, spot.effect, spot.sensor, spot.stage)
             known = blind.get(name)
             limit = SHARE * abs(spot.turns_at)
             blind[name] = limit if known is None else min(known, limit)
-    return Asked(tuple(blind.items()))
+    return PlanWanted(tuple(blind.items()))
 
 
 def _demand_same(system: System, found: Diagnosis) -> None:
@@ -50,12 +50,12 @@ def _moves(effect: str) -> bool:
     return known is not None and known.sensitivity is not None
 
 
-def _named(system: System, one: Finding | Rival) -> Named:
+def _named(system: System, one: Finding | Rival) -> NamedEffect:
     return _spelt(system, one.effect, one.sensor, one.stage)
 
 
-def _spelt(system: System, effect: str, sensor: str, stage: str) -> Named:
-    return Named(effect, sensor, stage if len(system.stages) > 1 else None)
+def _spelt(system: System, effect: str, sensor: str, stage: str) -> NamedEffect:
+    return NamedEffect(effect, sensor, stage if len(system.stages) > 1 else None)
 
 
 def _sizes(one: Finding) -> dict[str, float]:

@@ -13,7 +13,7 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
-from syncline_design.planning.path import GRAVITY_MPS2, STEP_S, Course
+from syncline_design.planning.path import GRAVITY_MPS2, STEP_S, CourseCommands
 from syncline_design.planning.vehicle import Vehicle
 
 LINE_S = 20.0
@@ -30,7 +30,7 @@ class Leg:
     name: str
     stage: int
     words: str
-    course: Course
+    course: CourseCommands
 
     @property
     def duration_s(self) -> float:
@@ -50,12 +50,12 @@ def ramps(vehicle: Vehicle, steps: list[tuple[float, float]], join_mps: float) -
 
 
 def _course(ahead: Array, right: Array | None = None, down: Array | None = None,
-            turn: Array | None = None) -> Course:  # fmt: skip
+            turn: Array | None = None) -> CourseCommands:  # fmt: skip
     zero = np.zeros_like(ahead)
-    return Course(ahead, *(zero if v is None else v for v in (right, down, turn)))
+    return CourseCommands(ahead, *(zero if v is None else v for v in (right, down, turn)))
 
 
-def turning(vehicle: Vehicle, speed: float, angles: list[float]) -> Course:
+def turning(vehicle: Vehicle, speed: float, angles: list[float]) -> CourseCommands:
     """Turns by some angles [rad] one after the other, at one speed held from ramp to ramp."""
     rate = vehicle.turn_radps(speed)
     counts = [max(round(abs(a) / rate / STEP_S), 1) for a in angles]
@@ -68,7 +68,7 @@ def turning(vehicle: Vehicle, speed: float, angles: list[float]) -> Course:
     return _course(ahead, turn=turn)
 
 
-def transition(vehicle: Vehicle, angle_rad: float) -> Course:
+def transition(vehicle: Vehicle, angle_rad: float) -> CourseCommands:
     """The turn between two legs, at the joining speed."""
     speed = vehicle.join_mps
     rate = vehicle.turn_radps(speed) if speed > 0.0 else vehicle.turn_radps(0.0)
@@ -91,18 +91,18 @@ def _mps(speed: float) -> str:
     return f"{to_digits(speed, 3)} m/s"
 
 
-def _straight(v: Vehicle) -> tuple[str, Course]:
+def _straight(v: Vehicle) -> tuple[str, CourseCommands]:
     ahead = ramps(v, [(v.fast_mps, LINE_S)], v.join_mps)
     return f"straight ahead at {_mps(v.fast_mps)} for {to_places(LINE_S, 0)} s", _course(ahead)
 
 
-def _slow(v: Vehicle) -> tuple[str, Course]:
+def _slow(v: Vehicle) -> tuple[str, CourseCommands]:
     speed = max(v.slowest_mps, 0.3 * v.v_max_mps)
     ahead = ramps(v, [(speed, LINE_S)], v.join_mps)
     return f"straight ahead at {_mps(speed)} for {to_places(LINE_S, 0)} s", _course(ahead)
 
 
-def _reciprocal(v: Vehicle) -> tuple[str, Course]:
+def _reciprocal(v: Vehicle) -> tuple[str, CourseCommands]:
     line = ramps(v, [(v.fast_mps, LINE_S / 2)], v.join_mps)
     turn = transition(v, math.pi)
     ahead = np.concatenate([line, turn.ahead, line])
@@ -111,7 +111,7 @@ def _reciprocal(v: Vehicle) -> tuple[str, Course]:
     return words, _course(ahead, turn=np.concatenate([zero, turn.turn, zero]))
 
 
-def _stop_and_go(v: Vehicle) -> tuple[str, Course] | None:
+def _stop_and_go(v: Vehicle) -> tuple[str, CourseCommands] | None:
     least = v.slowest_mps
     reach = min(v.fast_mps, least + 0.6 * v.acceleration_mps2 * 5.0)
     if reach <= least * 1.1:
@@ -121,7 +121,7 @@ def _stop_and_go(v: Vehicle) -> tuple[str, Course] | None:
     return f"three times from {slow} up to {_mps(reach)} and back, straight ahead", _course(ahead)
 
 
-def _slow_and_fast(v: Vehicle) -> tuple[str, Course] | None:
+def _slow_and_fast(v: Vehicle) -> tuple[str, CourseCommands] | None:
     low = max(v.slowest_mps, 0.25 * v.v_max_mps)
     if low > 0.9 * v.fast_mps:
         return None
@@ -133,7 +133,7 @@ def _slow_and_fast(v: Vehicle) -> tuple[str, Course] | None:
     return words, _course(ahead, turn=np.concatenate([zeros[0], turn.turn, zeros[1]]))
 
 
-def _speeds(v: Vehicle, hold_s: float) -> tuple[str, Course] | None:
+def _speeds(v: Vehicle, hold_s: float) -> tuple[str, CourseCommands] | None:
     """Two speeds on one line: the shortest that a delay and a lever arm do not share."""
     low = max(v.slowest_mps, 0.25 * v.v_max_mps)
     if low > 0.9 * v.fast_mps:
@@ -145,7 +145,7 @@ def _speeds(v: Vehicle, hold_s: float) -> tuple[str, Course] | None:
     return words, _course(ramps(v, [(low, hold_s), (v.fast_mps, hold_s)], v.join_mps))
 
 
-def _circle(v: Vehicle, sign: float) -> tuple[str, Course]:
+def _circle(v: Vehicle, sign: float) -> tuple[str, CourseCommands]:
     speed = _turning_speed(v)
     side = "right" if sign > 0 else "left"
     return f"a full circle to the {side} at {_mps(speed)}", turning(v, speed, [sign * FULL_RAD])
@@ -161,13 +161,13 @@ def _turning_speed(v: Vehicle) -> float:
 TURNS_WELL = 0.5
 
 
-def _eight(v: Vehicle) -> tuple[str, Course]:
+def _eight(v: Vehicle) -> tuple[str, CourseCommands]:
     speed = _turning_speed(v)
     words = f"a figure eight at {_mps(speed)}, first to the right"
     return words, turning(v, speed, [FULL_RAD, -FULL_RAD])
 
 
-def _reverse(v: Vehicle) -> tuple[str, Course] | None:
+def _reverse(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if not v.usual.reverses or v.slowest_mps > 0.0:
         return None
     speed = min(0.4 * v.v_max_mps, 0.6 * v.acceleration_mps2 * 4.0)
@@ -175,7 +175,7 @@ def _reverse(v: Vehicle) -> tuple[str, Course] | None:
     return f"twice ahead and back astern at {_mps(speed)}, the heading kept", _course(ahead)
 
 
-def _spin(v: Vehicle) -> tuple[str, Course] | None:
+def _spin(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if not v.usual.hovers:
         return None
     return "hover and turn once to the right, once to the left", turning(
@@ -183,7 +183,7 @@ def _spin(v: Vehicle) -> tuple[str, Course] | None:
     )
 
 
-def _sway(v: Vehicle, sideways: bool) -> tuple[str, Course] | None:
+def _sway(v: Vehicle, sideways: bool) -> tuple[str, CourseCommands] | None:
     """Roll or pitch of a multirotor: to and fro, leaning by what its acceleration takes."""
     if not v.usual.hovers:
         return None
@@ -197,7 +197,7 @@ def _sway(v: Vehicle, sideways: bool) -> tuple[str, Course] | None:
     return words, _course(zero, right=swing) if sideways else _course(swing)
 
 
-def _rock(v: Vehicle) -> tuple[str, Course] | None:
+def _rock(v: Vehicle) -> tuple[str, CourseCommands] | None:
     """Turns to and fro: an aeroplane rolls, others yaw."""
     speed = v.join_mps if v.motion == "fixed_wing" else _turning_speed(v)
     rate, cycles = v.turn_radps(speed), 4
@@ -212,7 +212,7 @@ def _rock(v: Vehicle) -> tuple[str, Course] | None:
     return words, _course(ahead, turn=turn)
 
 
-def _heights(v: Vehicle) -> tuple[str, Course] | None:
+def _heights(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if not v.usual.climbs:
         return None
     rate = min(0.15 * v.v_max_mps, 0.6 * v.acceleration_mps2 * 2.0, 0.04 * v.distance_m)
@@ -225,7 +225,7 @@ def _heights(v: Vehicle) -> tuple[str, Course] | None:
     )
 
 
-Maker = Callable[[Vehicle], "tuple[str, Course] | None"]
+Maker = Callable[[Vehicle], "tuple[str, CourseCommands] | None"]
 MAKERS: dict[str, Maker] = {
     "straight line": _straight,
     "slow line": _slow,

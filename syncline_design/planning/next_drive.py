@@ -13,7 +13,7 @@ from syncline_design.model.figure_text import to_places
 from syncline_design.planning.run import plan
 from syncline_design.planning.setup import PlanRequest
 from syncline_design.planning.telling import PlanRun
-from syncline_design.planning.wanted import Asked, Named, Pair, PlanError
+from syncline_design.planning.wanted import EffectPair, NamedEffect, PlanError, PlanWanted
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput
 
@@ -32,7 +32,7 @@ def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
     try:
         with within_s(LIMIT_S):
             for first, second in pairs:
-                run = plan(case, PlanRequest(Asked((), (Pair(first, second),))))
+                run = plan(case, PlanRequest(PlanWanted((), (EffectPair(first, second),))))
                 if run.result.least_minutes is not None:
                     return _short(case, run, first, second)
     except (BadInput, PlanError, NoVerdict):
@@ -40,7 +40,7 @@ def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
     return None
 
 
-def _pairs(found: Diagnosis, several: bool) -> Iterator[tuple[Named, Named]]:
+def _pairs(found: Diagnosis, several: bool) -> Iterator[tuple[NamedEffect, NamedEffect]]:
     """Causes that matter with their aliases, the commonest first, as far as a drive can help."""
     for one in found.findings:
         if one.kind == "noise" or not one.material or not _moves(one.effect):
@@ -55,11 +55,11 @@ def _moves(effect: str) -> bool:
     return known is not None and known.sensitivity is not None
 
 
-def _named(one: Finding | Rival, several: bool) -> Named:
-    return Named(one.effect, one.sensor, one.stage if several else None)
+def _named(one: Finding | Rival, several: bool) -> NamedEffect:
+    return NamedEffect(one.effect, one.sensor, one.stage if several else None)
 
 
-def _short(case: Case, run: PlanRun, first: Named, second: Named) -> NextDrive:
+def _short(case: Case, run: PlanRun, first: NamedEffect, second: NamedEffect) -> NextDrive:
     result = run.result
     command = ["syncline-design", "plan", str(case.path), "--separate", first.text, second.text]
     if not result.reached and result.least_minutes is not None:

@@ -27,7 +27,7 @@ PHASES = (0.3, 2.1, 4.4, 5.6)
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class CourseCommands:
     """Commands at every step: speeds ahead, to the right and down [m/s], turn rate [rad/s]."""
 
     ahead: Array
@@ -43,15 +43,18 @@ class Course:
         return len(self) * STEP_S
 
 
-def joined(courses: Sequence[Course]) -> Course:
+def joined(courses: Sequence[CourseCommands]) -> CourseCommands:
     """One course after the other."""
-    return Course(
-        **{f.name: np.concatenate([getattr(c, f.name) for c in courses]) for f in fields(Course)}
+    return CourseCommands(
+        **{
+            f.name: np.concatenate([getattr(c, f.name) for c in courses])
+            for f in fields(CourseCommands)
+        }
     )
 
 
 @dataclass(frozen=True, slots=True)
-class States:
+class PathStates:
     """Motion at moments time_s (n,): place [m] NED, velocity and acceleration NED, attitude
     (roll, pitch, yaw) [rad], body rates [rad/s], (n, 3) each."""
 
@@ -66,19 +69,19 @@ class States:
     def rotation(self) -> Array:
         return euler_to_rotation(self.euler_rad)
 
-    def at(self, time_s: Array) -> States:
+    def at(self, time_s: Array) -> PathStates:
         """The motion at other moments, between the steps by cubic splines."""
         from scipy.interpolate import CubicSpline
 
         values = np.hstack([getattr(self, f.name).reshape(len(self.time_s), -1)
-                            for f in fields(States)[1:]])  # fmt: skip
+                            for f in fields(PathStates)[1:]])  # fmt: skip
         found = CubicSpline(self.time_s, values)(time_s)
-        return States(time_s, *np.split(found, 5, axis=1))
+        return PathStates(time_s, *np.split(found, 5, axis=1))
 
 
 def travelled(
-    vehicle: Vehicle, course: Course, heading_rad: float = 0.0, start_s: float = 0.0
-) -> States:
+    vehicle: Vehicle, course: CourseCommands, heading_rad: float = 0.0, start_s: float = 0.0
+) -> PathStates:
     """The motion that a course makes, from the origin; start_s: since when the sea moves."""
     from scipy.ndimage import gaussian_filter1d
 
@@ -104,7 +107,7 @@ def travelled(
     euler = np.stack([roll, pitch, yaw], axis=1)
     acceleration: Array = np.gradient(velocity, STEP_S, axis=0)
     place = np.stack([_integral(velocity[:, k]) for k in range(3)], axis=1)
-    return States(time_s, place, velocity, acceleration, euler, _body_rates(euler))
+    return PathStates(time_s, place, velocity, acceleration, euler, _body_rates(euler))
 
 
 def _integral(rate: Array) -> Array:
@@ -179,6 +182,6 @@ def _body_rates(euler: Array) -> Array:
     )
 
 
-def point_of(states: States, arm_m: Array) -> Array:
+def point_of(states: PathStates, arm_m: Array) -> Array:
     """Where a point fixed in the body is [m], NED, (n, 3)."""
     return states.position_m + rotate(states.rotation, arm_m)

@@ -15,7 +15,7 @@ from syncline_design.logs.log import Log, StageLog
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.planning.aims import Aims, aims
-from syncline_design.planning.path import States, point_of
+from syncline_design.planning.path import PathStates, point_of
 from syncline_design.planning.vehicle import Vehicle
 
 AIRBORNE = ("multirotor", "fixed_wing", "level")
@@ -30,7 +30,7 @@ DWELL_S = 1.0  # for which one target is aimed at
 class Drive:
     """States of every stage at the rows, and what the last one aims at (None: nothing to)."""
 
-    states: tuple[States, ...]
+    states: tuple[PathStates, ...]
     aims: Aims | None
 
     @property
@@ -38,7 +38,7 @@ class Drive:
         return self.states[0].time_s
 
 
-def apart(vehicles: Sequence[Vehicle], states: Sequence[States]) -> tuple[States, ...]:
+def apart(vehicles: Sequence[Vehicle], states: Sequence[PathStates]) -> tuple[PathStates, ...]:
     """The stages' motions as far from each other as a chain has them: each below the last.
 
     What flies does so above its targets, which lie near the origin's level; what floats is at it.
@@ -46,7 +46,7 @@ def apart(vehicles: Sequence[Vehicle], states: Sequence[States]) -> tuple[States
     airborne = vehicles[0].motion in AIRBORNE
     placed, offset = [], np.array([0.0, 0.0, -vehicles[0].depth_m if airborne else 0.0])
     for vehicle, one in zip(vehicles, states, strict=True):
-        moved = States(one.time_s, one.position_m + offset, one.velocity_mps,
+        moved = PathStates(one.time_s, one.position_m + offset, one.velocity_mps,
                        one.acceleration_mps2, one.euler_rad, one.rate_radps)  # fmt: skip
         placed.append(moved)
         d = vehicle.distance_m
@@ -57,7 +57,7 @@ def apart(vehicles: Sequence[Vehicle], states: Sequence[States]) -> tuple[States
 def drive(
     system: System,
     vehicles: Sequence[Vehicle],
-    states: Sequence[States],
+    states: Sequence[PathStates],
     surveyed: Array | None = None,
 ) -> Drive:
     """States with the targets that the last stage aims at; rows without one in sight go."""
@@ -159,7 +159,7 @@ def _object(system: System, planned: Drive, index: int) -> Array:
     return point_of(planned.states[index + 1], arm)
 
 
-def _polar(states: States, arm_m: Array, object_m: Array) -> tuple[Array, Array, Array]:
+def _polar(states: PathStates, arm_m: Array, object_m: Array) -> tuple[Array, Array, Array]:
     """Range, azimuth and elevation of an object from the ranging sensor."""
     back = np.swapaxes(states.rotation, 1, 2)
     vector = rotate(back, object_m - states.position_m) - arm_m

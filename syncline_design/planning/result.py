@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 from syncline_design.diagnosis.result import SpecRead
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, Unbounded, optional
+from syncline_design.machine.records import Record, SchemaName, Unbounded, optional
 
 SCHEMA: Final = "syncline-design/plan/v1"
 
@@ -116,7 +116,7 @@ class Plan(Record):
     spec does not state.
     """
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     reached: bool
     spec: SpecRead
     minutes: float

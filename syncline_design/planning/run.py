@@ -8,11 +8,11 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
-from syncline_design.planning.drives import Outcome, outcome
+from syncline_design.planning.drives import WholeDrive, outcome
 from syncline_design.planning.search import (
     AREA_SHARE,
-    Search,
-    Told,
+    LegSearch,
+    LegTold,
     best_legs,
     extent_m,
     lasting_s,
@@ -51,7 +51,7 @@ class _Planning:
         in_force().doing("searching for legs")
         limit = in_force().left_s()
         deadline = in_force().inner(None if limit is None else SEARCH_SHARE * limit)
-        search = Search(self.setup.told, self.setup.judge, deadline, self._area())
+        search = LegSearch(self.setup.told, self.setup.judge, deadline, self._area())
         chosen, whole = best_legs(search, most_s, max(LONGEST_S, most_s))
         in_force().doing("looking at the whole drive")
         chosen, found = self._judged(search, chosen, most_s)
@@ -66,7 +66,7 @@ class _Planning:
         if not areas:
             return None
         area = (min(a[0] for a in areas), min(a[1] for a in areas))
-        known = Search(self.setup.told, self.setup.judge, in_force(), area)
+        known = LegSearch(self.setup.told, self.setup.judge, in_force(), area)
         if not any(known.fits([told]) for told in self.setup.told):
             least = min((extent_m([told]) for told in self.setup.told), key=max)
             raise PlanError(
@@ -78,8 +78,8 @@ class _Planning:
         return area
 
     def _judged(
-        self, search: Search, chosen: list[Told], most_s: float
-    ) -> tuple[list[Told], Outcome]:
+        self, search: LegSearch, chosen: list[LegTold], most_s: float
+    ) -> tuple[list[LegTold], WholeDrive]:
         """The whole drive; with more legs where the joints took what the search had counted on."""
         found = outcome(self.setup.world, chosen)
         for _ in range(3):
@@ -92,7 +92,7 @@ class _Planning:
             found = outcome(self.setup.world, chosen)
         return chosen, found
 
-    def _one_more(self, search: Search, chosen: list[Told], most_s: float) -> Told | None:
+    def _one_more(self, search: LegSearch, chosen: list[LegTold], most_s: float) -> LegTold | None:
         """The leg that tells most about what is worst."""
         trials = [[*chosen, told] for told in self.setup.told]
         trials = [trial for trial in trials if lasting_s(trial) <= most_s and search.fits(trial)]
@@ -100,11 +100,11 @@ class _Planning:
             return None
         return min(trials, key=lambda trial: search.value(trial)[1])[-1]
 
-    def _least_s(self, found: Outcome, whole: list[Told], most_s: float) -> float | None:
+    def _least_s(self, found: WholeDrive, whole: list[LegTold], most_s: float) -> float | None:
         """The least time that reaches all: this drive's, a longer one's, or so many of its kind."""
         if self.setup.reached(found) and duration_s(found) <= most_s:
             return duration_s(found)
-        search = Search(self.setup.told, self.setup.judge, in_force())
+        search = LegSearch(self.setup.told, self.setup.judge, in_force())
         if search.reaches(whole):
             return max(lasting_s(whole), 1.001 * most_s)
         needed = times_needed(self.setup.judge, together(whole))

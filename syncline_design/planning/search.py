@@ -45,7 +45,7 @@ CONFUSED: Final = 0.05  # weight of what other effects take of what is wanted
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class LegTold:
     """What one leg tells at each of the four headings: G00, G0d + Gd0, Gdd, (4, p + 1, p + 1) each,
     the last row and column what the noise shifts.
 
@@ -81,7 +81,7 @@ class Told:
 class Placed:
     """A leg in its place: which of the four headings, and when it begins, its turn done."""
 
-    told: Told
+    told: LegTold
     heading: int
     start_s: float
 
@@ -92,7 +92,7 @@ class Placed:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class LegsEnd:
     """Where some legs end: north and east [m], which of the four headings the last one had, the
     heading now, and when."""
 
@@ -101,7 +101,7 @@ class Way:
     heading_rad: float = 0.0
     end_s: float = 0.0
 
-    def then(self, told: Told) -> tuple[Placed, Way]:
+    def then(self, told: LegTold) -> tuple[Placed, LegsEnd]:
         """One more leg, at the heading that ends nearest to the start, the way back first."""
         moved = [_turned(told.moved_m, h) for h in range(4)]
         ends = [(self.place_m[0] + north, self.place_m[1] + east) for north, east in moved]
@@ -112,21 +112,21 @@ class Way:
         heading = costs.index(min(costs))
         begins_rad = QUARTER_RAD * heading
         placed = Placed(told, heading, self.end_s + told.turn_s(begins_rad - self.heading_rad))
-        return placed, Way(ends[heading], heading, begins_rad + told.turned_rad, placed.end_s)
+        return placed, LegsEnd(ends[heading], heading, begins_rad + told.turned_rad, placed.end_s)
 
 
-def arranged(sequence: Sequence[Told]) -> tuple[Placed, ...]:
+def arranged(sequence: Sequence[LegTold]) -> tuple[Placed, ...]:
     """Every leg at its heading and time."""
-    way, found = Way(), []
+    way, found = LegsEnd(), []
     for told in sequence:
         placed, way = way.then(told)
         found.append(placed)
     return tuple(found)
 
 
-def way_of(sequence: Sequence[Told]) -> Way:
+def way_of(sequence: Sequence[LegTold]) -> LegsEnd:
     """Where the legs of a sequence end."""
-    way = Way()
+    way = LegsEnd()
     for told in sequence:
         way = way.then(told)[1]
     return way
@@ -137,7 +137,7 @@ def _turned(moved: tuple[float, float], heading: int) -> tuple[float, float]:
     return moved[0] * cos - moved[1] * sin, moved[0] * sin + moved[1] * cos
 
 
-def extent_m(sequence: Sequence[Told]) -> tuple[float, float]:
+def extent_m(sequence: Sequence[LegTold]) -> tuple[float, float]:
     """North to south and east to west [m] that the legs take, without the turns between them."""
     place, low, high = np.zeros(2), np.zeros(2), np.zeros(2)
     for one in arranged(sequence):
@@ -149,12 +149,12 @@ def extent_m(sequence: Sequence[Told]) -> tuple[float, float]:
     return float(high[0] - low[0]), float(high[1] - low[1])
 
 
-def lasting_s(sequence: Sequence[Told]) -> float:
+def lasting_s(sequence: Sequence[LegTold]) -> float:
     """Of all legs with the turns between them."""
     return way_of(sequence).end_s
 
 
-def together(sequence: Sequence[Told]) -> Array:
+def together(sequence: Sequence[LegTold]) -> Array:
     """Information of all legs."""
     total: Array = np.sum([p.told.at(p.heading, p.start_s) for p in arranged(sequence)], axis=0)
     return total if sequence else np.zeros(())
@@ -209,7 +209,7 @@ def others_of(every: Sequence[Unknown], goal: Goal, library: Array, prior: Array
 
 
 @dataclass(frozen=True, slots=True)
-class Judge:
+class PlanJudge:
     """How far a plan is from what is asked: a ratio for every wish, reached at 1 and below.
 
     prior: of the unknowns, so that what is not seen at all yet still counts less or more.
@@ -291,15 +291,15 @@ def noncentrality_of(information: Array, pair: PairGoal) -> float:
 
 
 @dataclass(slots=True)
-class Search:
+class LegSearch:
     """A search over legs for a judge; where the time is over it stops with what it has."""
 
-    legs: tuple[Told, ...]
-    judge: Judge
+    legs: tuple[LegTold, ...]
+    judge: PlanJudge
     deadline: Deadline
     area_m: tuple[float, float] | None = None
 
-    def fits(self, sequence: Sequence[Told]) -> bool:
+    def fits(self, sequence: Sequence[LegTold]) -> bool:
         """Whether the legs stay within the area, with room for the turns between them."""
         if self.area_m is None:
             return True
@@ -308,13 +308,13 @@ class Search:
             for own, most in zip(extent_m(sequence), self.area_m, strict=True)
         )
 
-    def value(self, sequence: Sequence[Told]) -> tuple[float, float]:
+    def value(self, sequence: Sequence[LegTold]) -> tuple[float, float]:
         return self.judge.value(together(sequence))
 
-    def reaches(self, sequence: Sequence[Told]) -> bool:
+    def reaches(self, sequence: Sequence[LegTold]) -> bool:
         return bool(sequence) and self.judge.loss(together(sequence)) <= 0.0
 
-    def grown(self, begun: Sequence[Told], most_s: float) -> list[Told]:
+    def grown(self, begun: Sequence[LegTold], most_s: float) -> list[LegTold]:
         """Legs added one by one, each the best for its time, until all is reached."""
         plan = list(begun)
         loss, value = self.value(plan) if plan else (math.inf, 0.0)
@@ -329,9 +329,9 @@ class Search:
         return plan
 
     def _next(
-        self, plan: list[Told], value: float, most_s: float
-    ) -> tuple[Told, float, float] | None:
-        best: tuple[float, Told, float, float] | None = None
+        self, plan: list[LegTold], value: float, most_s: float
+    ) -> tuple[LegTold, float, float] | None:
+        best: tuple[float, LegTold, float, float] | None = None
         way, known = way_of(plan), together(plan)
         for told in self.legs:
             placed, after = way.then(told)
@@ -343,7 +343,7 @@ class Search:
                 best = (worth, told, loss, worse)
         return None if best is None else best[1:]
 
-    def shortened(self, plan: list[Told]) -> list[Told]:
+    def shortened(self, plan: list[LegTold]) -> list[LegTold]:
         """Legs left out or exchanged for shorter ones while everything stays reached."""
         for _ in range(SWEEPS):
             trials = [(lasting_s(t), t) for t in (*self._without(plan), *self._exchanged(plan))]
@@ -355,10 +355,10 @@ class Search:
             plan = found
         return plan
 
-    def _without(self, plan: list[Told]) -> list[list[Told]]:
+    def _without(self, plan: list[LegTold]) -> list[list[LegTold]]:
         return [plan[:k] + plan[k + 1 :] for k in range(len(plan))]
 
-    def _exchanged(self, plan: list[Told]) -> list[list[Told]]:
+    def _exchanged(self, plan: list[LegTold]) -> list[list[LegTold]]:
         if self.deadline.is_over:
             return []
         return [
@@ -368,7 +368,7 @@ class Search:
             if told is not plan[k]
         ]
 
-    def bettered(self, plan: list[Told], most_s: float) -> list[Told]:
+    def bettered(self, plan: list[LegTold], most_s: float) -> list[LegTold]:
         """Exchange of single legs while it brings a plan of at most this time nearer."""
         value = self.value(plan)[1]
         for _ in range(SWEEPS):
@@ -380,7 +380,9 @@ class Search:
         return plan
 
 
-def best_legs(search: Search, most_s: float, whole_s: float) -> tuple[list[Told], list[Told]]:
+def best_legs(
+    search: LegSearch, most_s: float, whole_s: float
+) -> tuple[list[LegTold], list[LegTold]]:
     """The plan for at most so much time, and the one that reaches all, however long it takes."""
     whole = _begun_anyhow(search, whole_s)
     if search.reaches(whole) and lasting_s(whole) <= most_s:
@@ -393,7 +395,7 @@ def best_legs(search: Search, most_s: float, whole_s: float) -> tuple[list[Told]
     return plan, whole
 
 
-def _begun_anyhow(search: Search, most_s: float) -> list[Told]:
+def _begun_anyhow(search: LegSearch, most_s: float) -> list[LegTold]:
     """The shortest that reaches all of what begins with the leg that tells most for its time, and
     of what begins with any other: what is best for its time first is not always best together."""
     best = search.grown([], most_s)
@@ -414,7 +416,7 @@ def _begun_anyhow(search: Search, most_s: float) -> list[Told]:
     return search.bettered(best, lasting_s(best) + 1e-6)
 
 
-def _two_legs(search: Search, best: list[Told]) -> list[Told]:
+def _two_legs(search: LegSearch, best: list[LegTold]) -> list[LegTold]:
     """The shortest of all drives of two legs where it is shorter still."""
     pairs = [[one, other] for one in search.legs for other in search.legs]
     timed = sorted(((lasting_s(pair), pair) for pair in pairs), key=lambda one: one[0])

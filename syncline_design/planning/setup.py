@@ -16,7 +16,7 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
-from syncline_design.planning.drives import Outcome, World
+from syncline_design.planning.drives import WholeDrive, World
 from syncline_design.planning.from_diagnosis import asked_of
 from syncline_design.planning.information import (
     Unknown,
@@ -27,23 +27,23 @@ from syncline_design.planning.information import (
 from syncline_design.planning.legs import Leg
 from syncline_design.planning.path import joined
 from syncline_design.planning.search import (
-    Judge,
-    Told,
+    LegTold,
+    PlanJudge,
     others_of,
     pair_ratio,
 )
 from syncline_design.planning.vehicle import vehicles
 from syncline_design.planning.wanted import (
-    Asked,
     Goal,
     PlanError,
+    PlanWanted,
     goal_of,
     keys_of,
     usual,
 )
 from syncline_design.spec.case import Case
 
-NOTHING_ASKED: Final = Asked()
+NOTHING_ASKED: Final = PlanWanted()
 DEFAULT_HZ: Final = 10.0
 SECONDS: Final = 60.0
 MOST_OF_ALL: Final = 1e4  # times all legs: what that does not tell apart, no drive does
@@ -53,7 +53,7 @@ MOST_OF_ALL: Final = 1e4  # times all legs: what that does not tell apart, no dr
 class PlanRequest:
     """What a plan is asked for; none of all: a commissioning drive."""
 
-    asked: Asked = NOTHING_ASKED
+    asked: PlanWanted = NOTHING_ASKED
     diagnosis: Diagnosis | None = None
     minutes: float = 10.0
     flown: tuple[Path, ...] = ()
@@ -68,8 +68,8 @@ class Setup:
     request: PlanRequest
     world: World
     goal: Goal
-    judge: Judge
-    told: tuple[Told, ...]
+    judge: PlanJudge
+    told: tuple[LegTold, ...]
     inseparable: tuple[str, ...]
 
     @classmethod
@@ -88,7 +88,7 @@ class Setup:
         library = np.sum([t.at(h, SECONDS * h) for t in told for h in range(4)], axis=0)
         goal, apart = _separable(system, world.every, goal, library)
         others = others_of(world.every, goal, library, prior)
-        return cls(case, request, world, goal, Judge(goal, prior, others), told, apart)
+        return cls(case, request, world, goal, PlanJudge(goal, prior, others), told, apart)
 
     @property
     def system(self) -> System:
@@ -100,7 +100,7 @@ class Setup:
         """Names of all unknowns."""
         return keys_of(self.system, self.world.every)
 
-    def reached(self, found: Outcome) -> bool:
+    def reached(self, found: WholeDrive) -> bool:
         """Whether a drive tells all that is asked, whatever it takes."""
         ratios = self.judge.ratios(found.after[-1], exact=True)
         return bool(np.all(ratios <= 1.0))
@@ -121,7 +121,7 @@ def _rate_hz(case: Case, system: System) -> float:
     return DEFAULT_HZ if rate is None else float(rate)
 
 
-def _asked(system: System, every: Sequence[Unknown], request: PlanRequest) -> Asked:
+def _asked(system: System, every: Sequence[Unknown], request: PlanRequest) -> PlanWanted:
     """What the options and the diagnosis ask for together; nothing: what usually matters."""
     reach, pairs = list(request.asked.reach), list(request.asked.pairs)
     if request.diagnosis is not None:
@@ -129,7 +129,7 @@ def _asked(system: System, every: Sequence[Unknown], request: PlanRequest) -> As
         given = {one.text for one, _ in reach}
         reach += [entry for entry in found.reach if entry[0].text not in given]
         pairs += found.pairs
-    asked = Asked(tuple(reach), tuple(pairs))
+    asked = PlanWanted(tuple(reach), tuple(pairs))
     if not asked.reach and not asked.pairs:
         asked = usual(system, every)
     if not asked.reach and not asked.pairs:

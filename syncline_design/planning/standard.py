@@ -17,8 +17,8 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.legs import FULL_RAD, LINE_S, Leg
-from syncline_design.planning.path import STEP_S, Course
-from syncline_design.planning.search import Judge, Told
+from syncline_design.planning.path import STEP_S, CourseCommands
+from syncline_design.planning.search import LegTold, PlanJudge
 from syncline_design.planning.vehicle import Vehicle
 
 LEAST_TURN_RAD: Final = math.radians(10.0)  # what lines that do not turn may wander
@@ -99,19 +99,19 @@ def _steady(value: float, duration_s: float) -> Array:
     return np.full(max(round(duration_s / STEP_S), 1), value)
 
 
-def _at(speed: float, duration_s: float) -> Course:
+def _at(speed: float, duration_s: float) -> CourseCommands:
     ahead = _steady(speed, duration_s)
     zero = np.zeros_like(ahead)
-    return Course(ahead, zero, zero, zero)
+    return CourseCommands(ahead, zero, zero, zero)
 
 
-def _turned(speed: float, turns: Sequence[Array]) -> Course:
+def _turned(speed: float, turns: Sequence[Array]) -> CourseCommands:
     turn = np.concatenate(turns)
     zero = np.zeros_like(turn)
-    return Course(np.full(turn.shape, speed), zero, zero, turn)
+    return CourseCommands(np.full(turn.shape, speed), zero, zero, turn)
 
 
-def line_plans(vehicle: Vehicle, told: Sequence[Told]) -> tuple[Lines, ...]:
+def line_plans(vehicle: Vehicle, told: Sequence[LegTold]) -> tuple[Lines, ...]:
     """The line plans of a vehicle."""
     known = {t.leg.name: t for t in told}
     rate = vehicle.turn_radps(_cornering(vehicle))
@@ -124,7 +124,7 @@ def line_plans(vehicle: Vehicle, told: Sequence[Told]) -> tuple[Lines, ...]:
     return tuple(found)
 
 
-def _turns_s(own: Sequence[tuple[Told, int]], rate_radps: float) -> Array:
+def _turns_s(own: Sequence[tuple[LegTold, int]], rate_radps: float) -> Array:
     """Time of the turn from the end of one leg to the heading of the next, around the round."""
     ends = [0.5 * math.pi * heading + told.turned_rad for told, heading in own]
     begins = [0.5 * math.pi * heading for _, heading in own]
@@ -135,7 +135,7 @@ def _turns_s(own: Sequence[tuple[Told, int]], rate_radps: float) -> Array:
     return np.array([angle / rate_radps if angle > LEAST_TURN_RAD else 0.0 for angle in angles])
 
 
-def legs_needed(judge: Judge, lines: Lines, taken: Collection[int]) -> int | None:
+def legs_needed(judge: PlanJudge, lines: Lines, taken: Collection[int]) -> int | None:
     """The fewest legs of a line plan, in its order, that reach what is asked; None: none do.
 
     taken: places of the effects that may take it all the same, as in the drive beside it.
@@ -149,7 +149,7 @@ def legs_needed(judge: Judge, lines: Lines, taken: Collection[int]) -> int | Non
     return None if before >= MOST_LEGS else before + 1
 
 
-def reached(judge: Judge, information: Array) -> bool:
+def reached(judge: PlanJudge, information: Array) -> bool:
     """Whether all that is asked is."""
     return bool(np.all(judge.ratios(information, exact=True) <= 1.0))
 
@@ -167,7 +167,7 @@ def most_within(holds: Callable[[int], bool]) -> int:
     return low
 
 
-def times_needed(judge: Judge, information: Array) -> int | None:
+def times_needed(judge: PlanJudge, information: Array) -> int | None:
     """How many times a drive has to be driven until all is reached; None: however often."""
     before = most_within(lambda count: not reached(judge, count * information))
     return None if before >= MOST_LEGS else before + 1

@@ -19,14 +19,14 @@ from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
-from syncline_design.planning.drives import Outcome, World
+from syncline_design.planning.drives import WholeDrive, World
 from syncline_design.planning.information import (
     canonical_correlation,
     fisher,
     sigmas,
     with_shift,
 )
-from syncline_design.planning.path import States
+from syncline_design.planning.path import PathStates
 from syncline_design.planning.planned_log import Drive
 from syncline_design.planning.result import (
     After,
@@ -67,15 +67,15 @@ class PlanRun(Shown):
     """
 
     result: Plan
-    path: States
+    path: PathStates
     target_m: Array
     leg: tuple[int, ...]
     driven: Drive
     motion: str
-    others: Mapping[str, States]
+    others: Mapping[str, PathStates]
 
 
-def duration_s(found: Outcome) -> float:
+def duration_s(found: WholeDrive) -> float:
     """Of the whole drive."""
     return found.stretches[-1].to_s
 
@@ -86,7 +86,7 @@ class Telling:
 
     setup: Setup
 
-    def whole(self, found: Outcome, least_s: float | None, most_s: float) -> PlanRun:
+    def whole(self, found: WholeDrive, least_s: float | None, most_s: float) -> PlanRun:
         """The result and the path of a drive; least_s: the least time that reaches all."""
         duration = duration_s(found)
         reached = self.setup.reached(found) and duration <= most_s
@@ -189,7 +189,7 @@ class Telling:
             for text, names in hidden.items()
         )
 
-    def _legs(self, found: Outcome) -> tuple[PlannedLeg, ...]:
+    def _legs(self, found: WholeDrive) -> tuple[PlannedLeg, ...]:
         return tuple(
             PlannedLeg(
                 f"{k} {one.leg.name}",
@@ -213,7 +213,7 @@ class Telling:
         ]
         return f"; meanwhile {' and '.join(held)}" if held else ""
 
-    def _standard(self, drive: Outcome) -> tuple[StandardPlan, ...]:
+    def _standard(self, drive: WholeDrive) -> tuple[StandardPlan, ...]:
         world, wanted = self.setup.world, self.setup.goal.wanted
         stage = world.every[wanted[0]].candidate.stage if wanted else 0
         found = []
@@ -234,7 +234,7 @@ class Telling:
             )
         return tuple(found)
 
-    def _path(self, found: Outcome) -> tuple[States, Array, tuple[int, ...]]:
+    def _path(self, found: WholeDrive) -> tuple[PathStates, Array, tuple[int, ...]]:
         """The path of the vehicle that drives (of several, the last), as it is written."""
         driven = found.driven
         stage = found.stretches[-1].leg.stage

@@ -38,7 +38,7 @@ class PlanError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
+class NamedEffect:
     """One effect of one sensor, as it was written."""
 
     effect: str
@@ -52,30 +52,30 @@ class Named:
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class EffectPair:
     """Two effects to tell apart; sizes: of the first's parameters by its key, where known."""
 
-    first: Named
-    second: Named
+    first: NamedEffect
+    second: NamedEffect
     sizes: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class PlanWanted:
     """What is asked: tolerances by effect (None: what matters to this system), and pairs."""
 
-    reach: tuple[tuple[Named, float | None], ...] = ()
-    pairs: tuple[Pair, ...] = ()
+    reach: tuple[tuple[NamedEffect, float | None], ...] = ()
+    pairs: tuple[EffectPair, ...] = ()
 
 
-def named(text: str, option: str) -> Named:
+def named(text: str, option: str) -> NamedEffect:
     """`latency(position)` read."""
     found = _NAME.fullmatch(text)
     if found is None:
         raise PlanError(f"{option} {text.strip()!r}: expected effect(sensor), "
                         "such as latency(position)")  # fmt: skip
     _demand_known(found["effect"], found["sensor"], option)
-    return Named(found["effect"], found["sensor"], found["stage"])
+    return NamedEffect(found["effect"], found["sensor"], found["stage"])
 
 
 def _demand_known(name: str, sensor: str, option: str) -> None:
@@ -97,9 +97,9 @@ def _demand_known(name: str, sensor: str, option: str) -> None:
         raise PlanError(f"{option}: {name}({sensor}) {why}; expected an effect that moves the mean")
 
 
-def reach_of(text: str) -> tuple[tuple[Named, float | None], ...]:
+def reach_of(text: str) -> tuple[tuple[NamedEffect, float | None], ...]:
     """`latency(position)=1 ms, lever_arm(position)=1 cm` read; each tolerance in its unit."""
-    found: list[tuple[Named, float | None]] = []
+    found: list[tuple[NamedEffect, float | None]] = []
     for part in text.split(","):
         name, mark, amount = part.partition("=")
         if not mark or not amount.strip():
@@ -113,7 +113,7 @@ def reach_of(text: str) -> tuple[tuple[Named, float | None], ...]:
     return tuple(found)
 
 
-def _tolerance(one: Named, amount: str) -> float:
+def _tolerance(one: NamedEffect, amount: str) -> float:
     effect = registry()[one.effect]
     kinds = {p.name: suffix_unit(p.name)[1] for p in effect.slopes()}
     problem = None
@@ -176,7 +176,7 @@ def text_of(system: System, one: Unknown) -> str:
     stage = None
     if len(system.stages) > 1 and c.stage != default_stage(system, c.sensor):
         stage = system.stages[c.stage].name
-    return Named(c.effect.name, c.sensor, stage).text
+    return NamedEffect(c.effect.name, c.sensor, stage).text
 
 
 def default_stage(system: System, sensor: str) -> int:
@@ -186,7 +186,9 @@ def default_stage(system: System, sensor: str) -> int:
     return next((k for k, s in enumerate(system.stages) if getattr(s, sensor) is not None), 0)
 
 
-def places(system: System, every: Sequence[Unknown], one: Named, option: str) -> tuple[int, ...]:
+def places(
+    system: System, every: Sequence[Unknown], one: NamedEffect, option: str
+) -> tuple[int, ...]:
     """Where the parameters of an effect stand among the unknowns; PlanError where it cannot act."""
     stage = default_stage(system, one.sensor)
     if one.stage is not None:
@@ -210,7 +212,7 @@ def places(system: System, every: Sequence[Unknown], one: Named, option: str) ->
 
 
 def goal_of(
-    system: System, every: Sequence[Unknown], asked: Asked, noise_m: float, per_unit: Array
+    system: System, every: Sequence[Unknown], asked: PlanWanted, noise_m: float, per_unit: Array
 ) -> Goal:
     """What is asked in terms of the unknowns; sizes that matter where nothing else is said."""
     matters = noise_m / np.maximum(per_unit, 1e-300)
@@ -227,7 +229,7 @@ def goal_of(
     return Goal(order, tolerance[list(order)], pairs)
 
 
-def _pair(system: System, every: Sequence[Unknown], pair: Pair, matters: Array) -> PairGoal:
+def _pair(system: System, every: Sequence[Unknown], pair: EffectPair, matters: Array) -> PairGoal:
     first = places(system, every, pair.first, "--separate")
     second = places(system, every, pair.second, "--separate")
     if first == second:
@@ -239,8 +241,8 @@ def _pair(system: System, every: Sequence[Unknown], pair: Pair, matters: Array) 
     return PairGoal(first, second, names, sizes, matters[list(second)], known)
 
 
-def usual(system: System, every: Sequence[Unknown]) -> Asked:
+def usual(system: System, every: Sequence[Unknown]) -> PlanWanted:
     """What a commissioning drive is for where nothing is asked."""
     known = {text_of(system, u) for u in every}
     chosen = [name for name in USUAL if name in known]
-    return Asked(tuple((named(name, "--reach"), None) for name in chosen))
+    return PlanWanted(tuple((named(name, "--reach"), None) for name in chosen))

@@ -7,14 +7,14 @@ from contextlib import suppress
 from typing import Annotated, Any, Final
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.conversion import conversion_of
 from syncline_design.model.figure_text import format_like, format_quantity
 from syncline_design.model.quantity import Dimension, Quantity, UnitError
 from syncline_design.report.render_console import aligned
 from syncline_design.report.text import visible
 from syncline_design.spec.catalog import SECTIONS as SECTIONS
-from syncline_design.spec.catalog import Catalog, Entry, SensorEntry
+from syncline_design.spec.catalog import Catalog, EntryKeys, SensorEntry
 from syncline_design.spec.catalog_check import CatalogCheck, converted_sigma
 from syncline_design.spec.facts import (
     SIGMA_DIMENSIONS,
@@ -53,7 +53,7 @@ class Narrowing:
     def _facts(self) -> tuple[Any, ...]:
         return (self.reach, self.medium, self.max_cost)
 
-    def answers(self, entry: Entry) -> bool | str:
+    def answers(self, entry: EntryKeys) -> bool | str:
         """Whether an entry fits; the key of a fact that it does not give and that decides."""
         if not isinstance(entry, SensorEntry):
             return not self.narrows
@@ -114,7 +114,7 @@ class Undecided(Record):
 class CatalogList(Record):
     """Entries that fit, and those of which a fact that was asked for is not known."""
 
-    schema: Annotated[str, Named(LIST_SCHEMA)]
+    schema: Annotated[str, SchemaName(LIST_SCHEMA)]
     entries: tuple[ListedEntry, ...]
     undecided: tuple[Undecided, ...]
 
@@ -152,7 +152,7 @@ class ShownFigure(Record):
 class WholeEntry(Record):
     """One entry of a catalog, whole."""
 
-    schema: Annotated[str, Named(ENTRY_SCHEMA)]
+    schema: Annotated[str, SchemaName(ENTRY_SCHEMA)]
     section: str
     id: str
     name: str
@@ -182,7 +182,7 @@ def listed(
     return CatalogList(LIST_SCHEMA, tuple(entries), tuple(undecided))
 
 
-def _listed(section: str, identity: str, entry: Entry, origins: Origins) -> ListedEntry:
+def _listed(section: str, identity: str, entry: EntryKeys, origins: Origins) -> ListedEntry:
     reach: Reach | None = getattr(entry, "reach", None)
     cost: Quantity | None = getattr(entry, "cost", None)
     lifecycle: Lifecycle | None = getattr(entry, "lifecycle", None)
@@ -199,7 +199,7 @@ def list_text(catalog: Catalog, found: CatalogList) -> str:
     """One line an entry: id, name, key figures."""
     blocks = []
     for name in SECTIONS:
-        entries: Mapping[str, Entry] = getattr(catalog, name)
+        entries: Mapping[str, EntryKeys] = getattr(catalog, name)
         kept = [one.id for one in found.entries if one.section == name]
         rows = [[one, visible(entries[one].name), _digest(entries[one])] for one in kept]
         if rows:
@@ -214,14 +214,14 @@ def list_text(catalog: Catalog, found: CatalogList) -> str:
     return "\n\n".join(blocks or ["no entry fits"]) + "\n"
 
 
-def _digest(entry: Entry) -> str:
+def _digest(entry: EntryKeys) -> str:
     figures = [
         f"{key} {shown(value)}" for key, value in _figures(entry) if key not in _NOT_IN_A_LINE
     ]
     return ", ".join(figures)
 
 
-def _figures(entry: Entry) -> list[tuple[str, Any]]:
+def _figures(entry: EntryKeys) -> list[tuple[str, Any]]:
     return [
         (key, value)
         for key, value in entry.told()
@@ -237,7 +237,7 @@ def shown(value: Any) -> str:
 def entry_data(catalog: Catalog, origins: Origins, identity: str) -> WholeEntry | None:
     """Every figure of an entry with what its sources print; None: no such entry."""
     for section in SECTIONS:
-        entry: Entry | None = getattr(catalog, section).get(identity)
+        entry: EntryKeys | None = getattr(catalog, section).get(identity)
         if entry is not None:
             origin = origins.get((section, identity), "")
             figures = tuple(_shown_figure(entry, key, value) for key, value in _figures(entry))
@@ -248,7 +248,7 @@ def entry_data(catalog: Catalog, origins: Origins, identity: str) -> WholeEntry 
     return None
 
 
-def _shown_figure(entry: Entry, key: str, value: Any) -> ShownFigure:
+def _shown_figure(entry: EntryKeys, key: str, value: Any) -> ShownFigure:
     parts = {name: one for name, one in entry.figures.items() if name.partition(".")[0] == key}
     bases = dict.fromkeys(
         basis for name in parts or (key,) if (basis := _basis(entry, name)) is not None
@@ -259,7 +259,7 @@ def _shown_figure(entry: Entry, key: str, value: Any) -> ShownFigure:
     )
 
 
-def _basis(entry: Entry, figure: str) -> str | None:
+def _basis(entry: EntryKeys, figure: str) -> str | None:
     return None if figure in ("modality", "type") else entry.basis_of(figure)
 
 

@@ -44,7 +44,7 @@ class Stamped:
 
 
 @dataclass(frozen=True, slots=True)
-class Vehicle:
+class ClockedVehicle:
     """The sensors of one vehicle and its host clock; offset_s None: taken as in step with UTC."""
 
     name: str
@@ -53,7 +53,7 @@ class Vehicle:
     offset_s: float | None
 
 
-def clocks(vehicles: Sequence[Vehicle], name: str = "fig-clocks") -> InlineChart:
+def clocks(vehicles: Sequence[ClockedVehicle], name: str = "fig-clocks") -> InlineChart:
     """Sensors to the left, clocks to the right, tau on every arrow between them."""
     rows = sum(len(v.sensors) for v in vehicles)
     height = HEAD + (HEAD + ROW) * len(vehicles) + ROW * rows
@@ -78,7 +78,7 @@ def clocks(vehicles: Sequence[Vehicle], name: str = "fig-clocks") -> InlineChart
     return draw(name, "Who stamps whom", spoken, (WIDTH, height), build)
 
 
-def _vehicle(axes: Axes, vehicle: Vehicle, top: float) -> float:
+def _vehicle(axes: Axes, vehicle: ClockedVehicle, top: float) -> float:
     """One vehicle from `top` downwards; where it ends."""
     axes.text(4.0, top + 0.5 * HEAD, shortened(vehicle.name, 40), va="center", color=MUTED)
     first = top + HEAD
@@ -120,7 +120,7 @@ def _sensor(axes: Axes, one: Stamped, y: float) -> None:
     ])  # fmt: skip
 
 
-def _to_utc(axes: Axes, vehicle: Vehicle, y: float) -> None:
+def _to_utc(axes: Axes, vehicle: ClockedVehicle, y: float) -> None:
     """How the host clock keeps to UTC; taken as the same where nothing is said of it."""
     offset = "in step" if vehicle.offset_s is None else (
         f"within {numbers.time(vehicle.offset_s, 3)}"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from syncline_design.diagnosis.plotted import (
     NormalPlot,
+    PlottedTrack,
     Spectrum,
-    Track,
 )
 from syncline_design.report import axes as scales
 from syncline_design.report import charts_diagnosis as drawings
@@ -28,14 +28,14 @@ BINS = 24
 UNITS = {"speed": "m/s", "turn_rate": "deg/s", "range": "m", "heading": "deg"}
 
 
-def longest_m(track: Track) -> tuple[float, float]:
+def longest_m(track: PlottedTrack) -> tuple[float, float]:
     """Longest mean residual before and after [m]."""
     before = [(a.before_north_m**2 + a.before_east_m**2) ** 0.5 for a in track.arrows]
     after = [(a.after_north_m**2 + a.after_east_m**2) ** 0.5 for a in track.arrows]
     return max(before, default=0.0), max(after, default=0.0)
 
 
-def drawn_larger(track: Track) -> float:
+def drawn_larger(track: PlottedTrack) -> float:
     """How many times larger than the map the arrows are drawn."""
     span = max(_span(track.north_m), _span(track.east_m), 1e-9)
     return LONGEST * span / max(*longest_m(track), 1e-12)
@@ -45,7 +45,7 @@ def _span(values: Sequence[float]) -> float:
     return max(values) - min(values) if values else 0.0
 
 
-def track_map(track: Track, name: str = "fig-track") -> InlineChart:
+def track_map(track: PlottedTrack, name: str = "fig-track") -> InlineChart:
     """The way from above, with the mean residual of each stretch as an arrow."""
     larger = drawn_larger(track)
     shape = _span(track.north_m) / max(_span(track.east_m), 1e-9)

@@ -19,7 +19,7 @@ from syncline_design.report.table import Table, Tone
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
 
-Reach = Literal["everywhere", "page", "text"]
+Audience = Literal["everywhere", "page", "text"]
 Style = Literal["", "strong", "muted", "code", "given"]
 
 
@@ -51,7 +51,7 @@ class Heading:
     kind: ClassVar = "heading"
     words: Inline
     aside: Inline = ""
-    reach: Reach = "everywhere"
+    reach: Audience = "everywhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Text:
     quiet: bool = False
     mark: str = ""
     tone: Tone = ""
-    reach: Reach = "everywhere"
+    reach: Audience = "everywhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class Facts:
     kind: ClassVar = "facts"
     pairs: Pairs
     look: Literal["facts", "record", "terms"] = "facts"
-    reach: Reach = "everywhere"
+    reach: Audience = "everywhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class Items:
     entries: tuple[Inline, ...]
     mark: str = ""
     tone: Tone = ""
-    reach: Reach = "everywhere"
+    reach: Audience = "everywhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,7 @@ class TableNode:
     kind: ClassVar = "table"
     table: Table
     silent: bool = False
-    reach: Reach = "everywhere"
+    reach: Audience = "everywhere"
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class Chart:
     name: str
     draw: Callable[[], InlineChart]
     caption: str
-    reach: Reach = "page"
+    reach: Audience = "page"
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ class Explorer:
     others_pass: bool
     tau_span: tuple[float, float]
     limit_span: tuple[float, float]
-    reach: Reach = "page"
+    reach: Audience = "page"
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ class Group:
     look: Literal["article", "column", "split", "pair", "flow", "trio", "alone", "fold"] = "column"
     key: str = ""
     summary: str = ""  # of a fold
-    reach: Reach = "everywhere"
+    reach: Audience = "everywhere"
 
 
 Node: TypeAlias = "Heading | Text | Facts | Items | TableNode | Chart | Explorer | Group"
@@ -166,7 +166,7 @@ class Section:
     title: str
     label: str
     nodes: tuple[Node, ...]
-    reach: Reach = "everywhere"
+    reach: Audience = "everywhere"
     folded: bool = False
 
 
@@ -219,7 +219,9 @@ def plain(words: Inline) -> str:
     return "".join(span.text for span in spans(words))
 
 
-def show(table: Table | None, *, silent: bool = False, reach: Reach = "everywhere") -> list[Node]:
+def show(
+    table: Table | None, *, silent: bool = False, reach: Audience = "everywhere"
+) -> list[Node]:
     """A table as a node; none, or one without rows, as nothing.
 
     A column in which no row says anything is left out, unless it names the rows.
@@ -233,13 +235,13 @@ def show(table: Table | None, *, silent: bool = False, reach: Reach = "everywher
 
 
 def section(key: str, title: str, nodes: Iterable[Node], label: str = "",
-            reach: Reach = "everywhere") -> list[Section]:  # fmt: skip
+            reach: Audience = "everywhere") -> list[Section]:  # fmt: skip
     """A section, or nothing where nothing stands in it; its label is its title unless given."""
     found = tuple(nodes)
     return [Section(key, title, label or title, found, reach)] if found else []
 
 
-def provenance(pairs: Sequence[tuple[str, str]], reach: Reach = "page") -> list[Section]:
+def provenance(pairs: Sequence[tuple[str, str]], reach: Audience = "page") -> list[Section]:
     """The last section: what made the result."""
     record = Facts(tuple((label, code(value)) for label, value in pairs), "record")
     return section("provenance", "Provenance", [record] if pairs else [], reach=reach)
@@ -255,7 +257,7 @@ def for_output(document: Document, output: Literal["page", "text"]) -> Document:
     return replace(document, sections=tuple(kept))
 
 
-def _reaching(nodes: Iterable[Node], output: Reach) -> Iterator[Node]:
+def _reaching(nodes: Iterable[Node], output: Audience) -> Iterator[Node]:
     for node in nodes:
         if node.reach not in ("everywhere", output):
             continue

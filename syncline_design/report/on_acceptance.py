@@ -8,8 +8,8 @@ from typing import Final
 from syncline_design.comparison.acceptance import (
     Acceptance,
     AssumptionResult,
+    AssumptionStatus,
     MeasuredFigure,
-    Status,
 )
 from syncline_design.report import numbers
 from syncline_design.report.ci import Level, Notice
@@ -30,14 +30,18 @@ from syncline_design.report.rendered import rendered
 from syncline_design.report.sarif import sarif_log
 from syncline_design.report.table import Cell, Table, Tone, table
 
-_OUTCOMES: Final[dict[Status, tuple[Tone, str, str]]] = {
+_OUTCOMES: Final[dict[AssumptionStatus, tuple[Tone, str, str]]] = {
     "holds": ("good", "\u2713", "holds"),
     "broken": ("bad", "\u2717", "broken"),
     "not_shown": ("warn", "!", "not shown"),
 }
-_ORDER: Final[tuple[Status, ...]] = ("broken", "not_shown", "holds")
-_LEVELS: Final[dict[Status, Level]] = {"holds": "pass", "broken": "fail", "not_shown": "undecided"}
-_WORDS: Final[dict[Status, str]] = {
+_ORDER: Final[tuple[AssumptionStatus, ...]] = ("broken", "not_shown", "holds")
+_LEVELS: Final[dict[AssumptionStatus, Level]] = {
+    "holds": "pass",
+    "broken": "fail",
+    "not_shown": "undecided",
+}
+_WORDS: Final[dict[AssumptionStatus, str]] = {
     "holds": "What was asked holds",
     "broken": "An assumption is broken",
     "not_shown": "Not everything is shown by these logs",
@@ -115,7 +119,14 @@ def _table(result: Acceptance) -> Table:
             Cell(_measured(row), value),
             Cell(row.evidence),
         ))  # fmt: skip
-    heads = ("Status", "Where", "Assumption", "Assumed #", "Measured (95 %) #", "Evidence")
+    heads = (
+        "AssumptionStatus",
+        "Where",
+        "Assumption",
+        "Assumed #",
+        "Measured (95 %) #",
+        "Evidence",
+    )
     return table("Assumptions", heads, rows)
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from syncline_design.comparison.difference import (
     Cause,
-    Changes,
     Difference,
     FigureChange,
     Pick,
     RequirementChange,
     Standing,
     VerdictChange,
+    VerdictChanges,
 )
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
@@ -70,7 +70,7 @@ def headline(data: Difference) -> str:
     return f"{lead}: {effect_words(data)}."
 
 
-def reasons(data: Difference | Changes) -> tuple[str, ...]:
+def reasons(data: Difference | VerdictChanges) -> tuple[str, ...]:
     """`What was chosen before has TVU-1 at 339.8 mm; the limit is now 320.2 mm.`"""
     rows = {one.id: one for one in data.requirements}
     told = []
@@ -85,7 +85,7 @@ def reasons(data: Difference | Changes) -> tuple[str, ...]:
     return tuple(told)
 
 
-def effect_words(data: Difference | Changes) -> str:
+def effect_words(data: Difference | VerdictChanges) -> str:
     """`payload changes, +1 900 EUR, error 12 mm larger, still meets its requirements`."""
     parts = ["payload changes" if data.payload else "same payload"]
     cost, error = data.sums[0], data.error.change

@@ -7,7 +7,7 @@ from typing import Final
 
 from syncline_design.paper.errata import Erratum
 from syncline_design.paper.plots import PlottedFigure, SimulatedPoint
-from syncline_design.paper.reproduce import TAU_CRIT_TABLES, Counts, Reproduction
+from syncline_design.paper.reproduce import TAU_CRIT_TABLES, CellCounts, Reproduction
 from syncline_design.paper.reproduce import PrintedCell as Printed
 from syncline_design.report import numbers
 from syncline_design.report.charts import SynclineCurve, syncline
@@ -81,7 +81,7 @@ def on_paper(result: Reproduction) -> Document:
     )  # fmt: skip
 
 
-def _facts(counts: Counts) -> Iterable[tuple[str, str]]:
+def _facts(counts: CellCounts) -> Iterable[tuple[str, str]]:
     for name, count in (
         ("\u03c4_crit cells", counts.tau_crit),
         ("Figures in the text", counts.text),

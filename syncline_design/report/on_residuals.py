@@ -10,8 +10,8 @@ from typing import Final
 from syncline_design.diagnosis.plotted import (
     NormalPlot,
     Plots,
+    PlottedTrack,
     Spectrum,
-    Track,
 )
 from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import charts_residuals as of_residuals
@@ -76,7 +76,7 @@ def _sizes(plots: Plots) -> tuple[list[float], list[float]]:
     )
 
 
-def _track_words(track: Track) -> str:
+def _track_words(track: PlottedTrack) -> str:
     first, last = of_residuals.longest_m(track)
     larger = numbers.number(of_residuals.drawn_larger(track), 2)
     words = (

@@ -35,7 +35,14 @@ from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.scatter import Scatter, scatter
-from syncline_design.studies.summary import Brief, Front, StudySummary, heat_map, summarise, varied
+from syncline_design.studies.summary import (
+    Brief,
+    StudyFront,
+    StudySummary,
+    heat_map,
+    summarise,
+    varied,
+)
 from syncline_design.studies.table import reason
 
 MOST_CASES = 500  # rows of the case table; CSV and Parquet have them all
@@ -139,7 +146,7 @@ def _facts(result: StudyResult) -> list[tuple[str, str]]:
     return facts + [(names[word], numbers.count(n)) for word, n in counts.items() if n]
 
 
-def _distinct_fronts(summary: StudySummary) -> list[Front]:
+def _distinct_fronts(summary: StudySummary) -> list[StudyFront]:
     """At most eight fronts, spread evenly over all that differ."""
     found = list(summary.fronts)
     if len(found) <= MOST_FRONTS:
@@ -148,7 +155,7 @@ def _distinct_fronts(summary: StudySummary) -> list[Front]:
     return [found[round(place * step)] for place in range(MOST_FRONTS)]
 
 
-def _common(summary: StudySummary, front: Front) -> str:
+def _common(summary: StudySummary, front: StudyFront) -> str:
     """What the cases that share a front have in common: that is what tells it from others."""
     chosen = [summary.briefs[number - 1] for number in front.cases]
     parts = []

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from syncline_design.planning.path import States
+from syncline_design.planning.path import PathStates
 from syncline_design.planning.telling import PlanRun
 from syncline_design.report.csv_out import plain_csv
 from syncline_design.report.json_out import json_text
@@ -69,7 +69,7 @@ def waypoints_csv(run: PlanRun) -> str:
     return plain_csv((*COLUMNS, *names), whole)
 
 
-def _pose(states: States) -> list[list[float]]:
+def _pose(states: PathStates) -> list[list[float]]:
     """Place and attitude row by row, as they are written."""
     angles = np.degrees(
         np.column_stack([states.euler_rad[:, :2], _wrapped(states.euler_rad[:, 2])])

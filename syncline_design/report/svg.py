@@ -77,7 +77,7 @@ Build = Callable[["Figure"], "Axes | None"]
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Tip:
     """A place in a figure, in SVG units from its left upper corner, and what it says.
 
     wide, high: of a bar, whose corner the place then is.
@@ -99,7 +99,7 @@ class InlineChart:
 
     svg: str
     box: LogBox | None = None
-    told: tuple[Told, ...] = ()
+    told: tuple[Tip, ...] = ()
     exported: Callable[[Literal["svg", "png"]], bytes] | None = None
 
 
@@ -166,14 +166,14 @@ def _saved(figure: Figure, kind: Literal["svg", "png"], dpi: float, ground: str)
     return stream.getvalue()
 
 
-def _places(height: float, notes: Sequence[_Note]) -> Iterator[Told]:
+def _places(height: float, notes: Sequence[_Note]) -> Iterator[Tip]:
     """Where in the drawn figure the noted places lie."""
     for axes, (x0, x1), (y0, y1), says in notes:
         a, b = axes.transData.transform([(x0, y0), (x1, y1)])
         left, right = sorted((float(a[0]), float(b[0])))
         low, top = sorted((float(a[1]), float(b[1])))
         shown = {label: visible(value) for label, value in says.items()}
-        yield Told(round(left, 1), round(height - top, 1), round(right - left, 1),
+        yield Tip(round(left, 1), round(height - top, 1), round(right - left, 1),
                    round(top - low, 1), shown)  # fmt: skip
 
 

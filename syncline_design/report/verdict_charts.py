@@ -145,7 +145,7 @@ def clocks_chart(verdict: Verdict) -> list[Node]:
             clock = kept.get(vehicle)
             name = "no clock of its own named" if clock is None else clock.name
             offset = None if clock is None else clock.offset_bound_s
-            drawn.append(clocks.Vehicle(vehicle, sensors, name, offset))
+            drawn.append(clocks.ClockedVehicle(vehicle, sensors, name, offset))
         return clocks.clocks(drawn)
 
     caption = (

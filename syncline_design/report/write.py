@@ -15,8 +15,8 @@ from syncline_design.machine.result_files import OutputError, descriptor_of, is_
 from syncline_design.report.formats import CHART_FORMATS, NOT_FOR_A_TERMINAL
 
 __all__ = [
-    "STDOUT", "OutputError", "Target", "apart", "check_targets", "check_writable", "parse_target",
-    "write_outputs",
+    "STDOUT", "OutputError", "OutputTarget", "apart", "check_targets", "check_writable",
+    "parse_target", "write_outputs",
 ]  # fmt: skip
 
 STDOUT: Final = "-"
@@ -25,7 +25,7 @@ _HEAD_BYTES: Final = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class OutputTarget:
     """One `--output FORMAT:PATH`; path `-` is standard output; named: by the user."""
 
     format: str
@@ -33,7 +33,7 @@ class Target:
     named: bool = True
 
 
-def parse_target(argument: str, known: Sequence[str], stem: str = "report") -> Target:
+def parse_target(argument: str, known: Sequence[str], stem: str = "report") -> OutputTarget:
     """`html:out/report.html` -> Target; OutputError for an unknown format or an empty path.
 
     A bare format means standard output, as in `--output json`; pages and binary tables, which are
@@ -58,8 +58,8 @@ def parse_target(argument: str, known: Sequence[str], stem: str = "report") -> T
     if not separator and name in NOT_FOR_A_TERMINAL:
         path = f"{stem}.{name}"
         _keep_others(Path(path), argument)
-        return Target(name, path, named=False)
-    return Target(name, STDOUT if not separator or descriptor_of(path) == 1 else path)
+        return OutputTarget(name, path, named=False)
+    return OutputTarget(name, STDOUT if not separator or descriptor_of(path) == 1 else path)
 
 
 def _keep_others(path: Path, argument: str) -> None:
@@ -78,7 +78,7 @@ def _keep_others(path: Path, argument: str) -> None:
         )
 
 
-def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None:
+def check_targets(targets: Sequence[OutputTarget], reads: Sequence[Path] = ()) -> None:
     """Refuse, before anything is computed, targets that cannot be written or that collide.
 
     reads: files that the command is known to read; no result may take the place of one of them,
@@ -103,7 +103,7 @@ def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None
             check_writable(Path(target.path))
 
 
-def _check_folder(target: Target, inputs: set[str]) -> None:
+def _check_folder(target: OutputTarget, inputs: set[str]) -> None:
     """Refuse a place for charts that is a file, or cannot become a folder."""
     path = Path(target.path)
     if os.path.realpath(path) in inputs or (path.exists() and not path.is_dir()):
@@ -111,7 +111,7 @@ def _check_folder(target: Target, inputs: set[str]) -> None:
     check_writable(path / f"chart.{target.format}")
 
 
-def apart(path: Path, targets: Sequence[Target]) -> None:
+def apart(path: Path, targets: Sequence[OutputTarget]) -> None:
     """Refuse a file that is written besides the targets and is one of them."""
     key = os.path.realpath(path)
     for target in targets:
@@ -119,7 +119,7 @@ def apart(path: Path, targets: Sequence[Target]) -> None:
             raise OutputError(f"two outputs go to {target.path}; give each its own path")
 
 
-def _keep_inputs(target: Target, key: str, inputs: set[str]) -> None:
+def _keep_inputs(target: OutputTarget, key: str, inputs: set[str]) -> None:
     if key in inputs:
         raise OutputError(f"{target.path}: is read by this command; write the result elsewhere")
     if key.endswith((".yaml", ".yml")) and Path(key).is_file():
@@ -149,7 +149,7 @@ def check_writable(path: Path) -> None:
         raise OutputError(f"{path}: no permission to write in {parent}")
 
 
-def write_outputs(rendered: Sequence[tuple[Target, str | bytes]]) -> None:
+def write_outputs(rendered: Sequence[tuple[OutputTarget, str | bytes]]) -> None:
     """Write every rendered text; files first, each atomically, then standard output.
 
     A full disk leaves every old file as it was.

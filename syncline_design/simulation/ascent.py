@@ -21,7 +21,7 @@ _STEP = 1e-6  # of the forward differences, in units of each block
 _MOVES = (1.0, 0.5, 0.2, 0.05, 0.01, 0.002)  # fractions of the way to the ascent direction
 _STRIDES = (1.0, 3.0, 10.0, 30.0)  # multiples of the last step to go on by: climbs along ridges
 SYSTEM = -1  # the stage number of blocks that all stages share
-Kind = Literal["ball", "sphere"]
+RegionKind = Literal["ball", "sphere"]
 Index = NDArray[np.intp]
 Objective = Callable[[Array, Index], Array]  # points (p, n), problem of each (n,) -> values (n,)
 
@@ -32,11 +32,11 @@ class FreeVector:
 
     stage: int
     name: str
-    kind: Kind
+    kind: RegionKind
     rows: slice
 
 
-def stacked(kinds: list[tuple[int, str, Kind, int]]) -> tuple[FreeVector, ...]:
+def stacked(kinds: list[tuple[int, str, RegionKind, int]]) -> tuple[FreeVector, ...]:
     """Blocks of (stage, name, kind, length) one below the other."""
     found: list[FreeVector] = []
     start = 0

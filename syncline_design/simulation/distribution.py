@@ -21,7 +21,7 @@ Counts = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
-class Values:
+class ErrorValues:
     """Every error [m], in the order of drawing."""
 
     errors_m: Array

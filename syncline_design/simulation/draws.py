@@ -23,7 +23,7 @@ from syncline_design.model.timing import (
 )
 from syncline_design.simulation.kernel import Draw
 
-Shifts = Mapping[tuple[str, RoleName], Array]  # timestamp error mu [s] of (stage, role)
+TimeShifts = Mapping[tuple[str, RoleName], Array]  # timestamp error mu [s] of (stage, role)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def sight(look: Look, across: Array, up: Array) -> Array:
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), z])
 
 
-def timing_draws(system: System, source: RandomSource) -> Shifts:
+def timing_draws(system: System, source: RandomSource) -> TimeShifts:
     """mu [s] of every sensor that enters, against true time (UTC).
 
     What a sensor stamped t on the host clock was valid at t + eps of that clock, and offset is
@@ -154,7 +154,7 @@ def _distribution_draw(distribution: Distribution, source: RandomSource) -> Arra
 def stage_draw(
     system: System,
     index: int,
-    shifts: Shifts,
+    shifts: TimeShifts,
     source: RandomSource,
     inside: bool,
 ) -> Draw:
@@ -243,7 +243,7 @@ def noise_draw(stage: Stage, source: RandomSource) -> dict[str, Array]:
     return {"position_noise_m": position, "angle_noise_rad": angles, "range_noise_m": distance}
 
 
-def stage_shifts(system: System, index: int, shifts: Shifts, count: int) -> dict[str, Array]:
+def stage_shifts(system: System, index: int, shifts: TimeShifts, count: int) -> dict[str, Array]:
     """mu [s] as fields of `Draw`; a later stage's position is stamped by the ranging before it."""
     stage = system.stages[index]
     zero = np.zeros(count)

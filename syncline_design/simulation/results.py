@@ -13,10 +13,10 @@ from syncline_design import __version__
 from syncline_design.effects.record import Array
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, Unbounded, optional
+from syncline_design.machine.records import Record, SchemaName, Unbounded, optional
 from syncline_design.model.figure_text import format_quantity, percent, to_digits
 from syncline_design.model.quantity import Dimension
-from syncline_design.simulation.distribution import Binned, Values
+from syncline_design.simulation.distribution import Binned, ErrorValues
 from syncline_design.simulation.settings import Envelope
 
 SCHEMA: Final = "syncline-design/simulation/v1"
@@ -197,7 +197,7 @@ class Simulation(Record):
     spec, provenance: missing where a system was simulated that comes from no spec.
     """
 
-    schema: Annotated[str, Named(SCHEMA)]
+    schema: Annotated[str, SchemaName(SCHEMA)]
     monte_carlo: MonteCarlo
     syncline: SimulatedSyncline
     trajectory: str | None
@@ -231,7 +231,7 @@ def worst_case(
     return WorstCase(tau_s, value_m, syncline_m, ratio, bound_m, certificate)
 
 
-def histogram(found: Values | Binned) -> Histogram:
+def histogram(found: ErrorValues | Binned) -> Histogram:
     """The density over equal bins from 0 to the largest error."""
     edges, density = found.histogram(HISTOGRAM_BINS)
     return Histogram(tuple(_floats(edges)), tuple(_floats(density)))

@@ -16,7 +16,7 @@ from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation import distribution
 from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
-from syncline_design.simulation.distribution import KEPT_VALUES, Binned, Values
+from syncline_design.simulation.distribution import KEPT_VALUES, Binned, ErrorValues
 from syncline_design.simulation.ensemble import ensemble_of
 from syncline_design.simulation.excursions import excursions, follows_a_file
 from syncline_design.simulation.intervals import proportion_interval, quantile_ranks
@@ -55,7 +55,7 @@ class CrossCheck:
     """A Monte Carlo with the errors that it counted, so that `decide` need not draw them again."""
 
     monte_carlo: MonteCarlo
-    errors: Values | Binned = field(repr=False, compare=False)
+    errors: ErrorValues | Binned = field(repr=False, compare=False)
     system: System  # at one distance a stage
 
 
@@ -128,7 +128,7 @@ def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) ->
 
 
 def _monte_carlo(
-    settings: SimulationSettings, found: Values | Binned, worst: WorstCase, drawn: Ensemble
+    settings: SimulationSettings, found: ErrorValues | Binned, worst: WorstCase, drawn: Ensemble
 ) -> MonteCarlo:
     estimates = quantile_estimates(found, settings.quantiles, settings.confidence)
     within = None
@@ -153,7 +153,7 @@ def _monte_carlo(
 
 
 def quantile_estimates(
-    found: Values | Binned, quantiles: tuple[float, ...], confidence: float
+    found: ErrorValues | Binned, quantiles: tuple[float, ...], confidence: float
 ) -> tuple[QuantileEstimate, ...]:
     """Quantiles, each between two order statistics that enclose it with `confidence`."""
     ranks = [quantile_ranks(quantile, found.count, confidence) for quantile in quantiles]
@@ -250,7 +250,7 @@ def _counted(
 ) -> tuple[distribution.Counts, int, int]:
     """(counts, how many within the limit, how many) of the samples of a first run, if any fits."""
     counts = distribution.no_counts()
-    if first is None or not isinstance(first.errors, Values):
+    if first is None or not isinstance(first.errors, ErrorValues):
         return counts, 0, 0
     drawn = first.monte_carlo
     if (drawn.samples, drawn.seed, drawn.envelope) != (
@@ -278,7 +278,7 @@ def look_sizes(samples: int, cap_samples: int) -> list[int]:
     return sizes
 
 
-def error_distribution(system: System, settings: SimulationSettings) -> Values | Binned:
+def error_distribution(system: System, settings: SimulationSettings) -> ErrorValues | Binned:
     """Distribution of |error| over `settings.samples` samples; memory does not grow beyond
     `KEPT_VALUES` of them."""
     demand_simulable(system)
@@ -289,6 +289,6 @@ def error_distribution(system: System, settings: SimulationSettings) -> Values |
             kept[start : start + errors.shape[1]] = norm(errors)
 
         run_jobs(system, settings, 0, settings.samples, keep)
-        return Values(kept)
+        return ErrorValues(kept)
     counts, _ = tally(system, settings, 0, settings.samples, math.inf)
     return Binned(counts)

@@ -18,12 +18,12 @@ from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.roles import ROLES
 from syncline_design.model.syncline import Sigma
 from syncline_design.model.system import Stage, System
-from syncline_design.model.underway import Cause, underway
+from syncline_design.model.underway import UnderwayCause, underway
 from syncline_design.simulation import kernel
 from syncline_design.simulation.ascent import (
     SYSTEM,
     FreeVector,
-    Kind,
+    RegionKind,
     at_length_one,
     chosen,
     stacked,
@@ -38,7 +38,7 @@ from syncline_design.simulation.drawn_effects import (
     wandering,
 )
 from syncline_design.simulation.draws import (
-    Shifts,
+    TimeShifts,
     generator,
     lever_arms,
     ranging_shares,
@@ -212,7 +212,7 @@ class Situations:
 
 
 def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
-    kinds: list[tuple[int, str, Kind, int]] = [
+    kinds: list[tuple[int, str, RegionKind, int]] = [
         (SYSTEM, f"held {k}", "ball", 1) for k, is_held in enumerate(held) if is_held
     ]
     if system.effects:
@@ -226,7 +226,7 @@ def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
             kinds += sights(index, stage)
             if stage.platform.nearest_m is not None:
                 kinds.append((index, "distance", "ball", 1))
-    bends: dict[Cause, str] = {"path": "pull", "turn": "twist"}
+    bends: dict[UnderwayCause, str] = {"path": "pull", "turn": "twist"}
     kinds += [
         (one.stage, bends[one.cause], "sphere", 3) for one in underway(system) if one.cause in bends
     ]
@@ -234,7 +234,7 @@ def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
 
 
 def _draw(
-    system: System, index: int, picked: dict[str, Array], shifts: Shifts, count: int
+    system: System, index: int, picked: dict[str, Array], shifts: TimeShifts, count: int
 ) -> kernel.Draw:
     """A stage at its limits of speed and turn rate in the chosen directions, without noise."""
     stage = system.stages[index]
@@ -262,11 +262,11 @@ def _bending(picked: dict[str, Array], name: str) -> Array | None:
     return picked[name].T if name in picked else None
 
 
-def sights(index: int, stage: Stage) -> list[tuple[int, str, Kind, int]]:
+def sights(index: int, stage: Stage) -> list[tuple[int, str, RegionKind, int]]:
     """Blocks of a line of sight: any direction, or the height and azimuth of a `look`."""
     if stage.look is None:
         return [(index, "bearing", "sphere", 3)]
-    around: tuple[int, str, Kind, int] = (index, "azimuth", "sphere", 2)
+    around: tuple[int, str, RegionKind, int] = (index, "azimuth", "sphere", 2)
     if stage.look.azimuth is not None:
         around = (index, "azimuth", "ball", 1)
     return [around, (index, "elevation", "ball", 1)]

@@ -33,7 +33,7 @@ from syncline_design.simulation import known_effects
 from syncline_design.simulation.chain import ChainNoise
 from syncline_design.simulation.draws import (
     RandomSource,
-    Shifts,
+    TimeShifts,
     directions,
     lever_arms,
     noise_draw,
@@ -157,7 +157,7 @@ def _rows(
 
 
 def _noise(
-    system: System, index: int, shifts: Shifts, source: RandomSource, rows: StageRows
+    system: System, index: int, shifts: TimeShifts, source: RandomSource, rows: StageRows
 ) -> ChainNoise:
     stage = system.stages[index]
     drawn = noise_draw(stage, source)

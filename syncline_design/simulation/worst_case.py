@@ -21,7 +21,7 @@ from syncline_design.simulation.ascent import (
     Ascent,
     FreeVector,
     Index,
-    Kind,
+    RegionKind,
     at_length_one,
     chosen,
     stacked,
@@ -44,7 +44,7 @@ def _is_placed(system: System) -> bool:
 
 def blocks(system: System) -> tuple[FreeVector, ...]:
     """What may be chosen: once for the system when and where, then stage by stage."""
-    kinds: list[tuple[int, str, Kind, int]] = []
+    kinds: list[tuple[int, str, RegionKind, int]] = []
     if system.effects:
         kinds = [(SYSTEM, "time", "ball", 1), (SYSTEM, "place", "ball", 2)]
     for index, stage in enumerate(system.stages):
@@ -52,8 +52,8 @@ def blocks(system: System) -> tuple[FreeVector, ...]:
     return stacked(kinds)
 
 
-def _stage_blocks(stage: Stage, index: int, placed: bool) -> list[tuple[str, Kind, int]]:
-    found: list[tuple[str, Kind, int]] = [
+def _stage_blocks(stage: Stage, index: int, placed: bool) -> list[tuple[str, RegionKind, int]]:
+    found: list[tuple[str, RegionKind, int]] = [
         ("velocity", "ball", 3),
         ("rate", "ball", 3),
         ("position_shift", "ball", 1),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from syncline_design.spec.case import Candidate, Case, StageCase
+from syncline_design.spec.case import CandidateEntry, Case, StageCase
 from syncline_design.spec.catalog import ClockEntry, Product, SensorEntry, TimestampingEntry
 from syncline_design.spec.existence import (
     SOUND_MPS,
@@ -66,7 +66,7 @@ def path_medium(stage: StageCase) -> Medium | None:
 
 
 def barred_sensor(
-    case: Case, stage: StageCase, around: Surroundings, sensor: Candidate[SensorEntry]
+    case: Case, stage: StageCase, around: Surroundings, sensor: CandidateEntry[SensorEntry]
 ) -> RuledOut | None:
     """Why a sensor cannot work on a stage at any distance; None where it can."""
     found = list(out_of_place(sensor.id, sensor.entry, around))
@@ -82,7 +82,7 @@ def barred_sensor(
 
 
 def barred_method(
-    case: Case, stage: StageCase, method: Candidate[TimestampingEntry]
+    case: Case, stage: StageCase, method: CandidateEntry[TimestampingEntry]
 ) -> RuledOut | None:
     """Why a timestamping method cannot work on a stage; None where it can."""
     found = _of_parts(case, method, [stage])
@@ -90,7 +90,7 @@ def barred_method(
     return _strongest([*found, *([untimed] if untimed is not None else [])])
 
 
-def barred_clock(case: Case, vehicle: str, clock: Candidate[ClockEntry]) -> RuledOut | None:
+def barred_clock(case: Case, vehicle: str, clock: CandidateEntry[ClockEntry]) -> RuledOut | None:
     """Why a clock cannot run so on a vehicle; None where it can."""
     aboard = [stage for stage in case.stages if stage.choice.vehicle_name == vehicle]
     untimed = untimed_clock(case, vehicle, clock)
@@ -100,7 +100,7 @@ def barred_clock(case: Case, vehicle: str, clock: Candidate[ClockEntry]) -> Rule
 
 def _of_parts(
     case: Case,
-    one: Candidate[TimestampingEntry] | Candidate[ClockEntry],
+    one: CandidateEntry[TimestampingEntry] | CandidateEntry[ClockEntry],
     stages: Iterable[StageCase],
 ) -> Iterator[RuledOut]:
     """What is wrong with an entry, or with the shared hardware that it requires, on any stage."""

@@ -23,7 +23,7 @@ from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.spec.catalog import (
     Catalog,
     ClockEntry,
-    Entry,
+    EntryKeys,
     InfrastructureEntry,
     PlatformEntry,
     Primitive,
@@ -43,14 +43,14 @@ from syncline_design.spec.requirement import DistanceLimit
 from syncline_design.spec.spec import Requirement, Spec
 from syncline_design.spec.yaml_text import KeyPath, TextPosition
 
-E = TypeVar("E", bound=Entry)
+E = TypeVar("E", bound=EntryKeys)
 P = TypeVar("P", bound=Product)
 Origins = Mapping[tuple[str, str], str]  # (section, id) to file:line:column
 IN_PLACE = "spec"  # origin of what the spec itself gives
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate(Generic[E]):
+class CandidateEntry(Generic[E]):
     """An entry that a design may use; origin: `file:line:column` that defines it.
 
     owned: it is there already, so that the entry here costs nothing.
@@ -72,8 +72,8 @@ class RoleCase:
 
     role: RoleName
     choice: RoleChoice
-    sensors: tuple[Candidate[SensorEntry], ...]
-    methods: tuple[Candidate[TimestampingEntry], ...]
+    sensors: tuple[CandidateEntry[SensorEntry], ...]
+    methods: tuple[CandidateEntry[TimestampingEntry], ...]
     inline: InlineTimestamping | None
     incomplete: tuple[tuple[str, str], ...] = ()  # (id, figure)
 
@@ -92,9 +92,9 @@ class StageCase:
 
     index: int
     choice: StageChoice
-    platform: Candidate[PlatformEntry]
+    platform: CandidateEntry[PlatformEntry]
     roles: tuple[RoleCase, ...]
-    clocks: tuple[Candidate[ClockEntry], ...]
+    clocks: tuple[CandidateEntry[ClockEntry], ...]
 
     @property
     def distances(self) -> tuple[float, float]:
@@ -130,7 +130,7 @@ class Case:
     trajectory: FileContent | None = None
     missions: tuple[Mission, ...] = ()
     stages: tuple[StageCase, ...] = field(init=False, repr=False)
-    hardware: Mapping[str, Candidate[InfrastructureEntry]] = field(init=False, repr=False)
+    hardware: Mapping[str, CandidateEntry[InfrastructureEntry]] = field(init=False, repr=False)
     effects: tuple[EffectEntry, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -154,7 +154,7 @@ class Case:
             return Fraction(limit)
         return self.spec.in_currency(limit) if requirement.kind == "cost" else limit.exact
 
-    def clocks(self, vehicle: str) -> tuple[Candidate[ClockEntry], ...]:
+    def clocks(self, vehicle: str) -> tuple[CandidateEntry[ClockEntry], ...]:
         """Clock disciplines that a vehicle's host may have; its stages agree on them."""
         aboard = (one for one in self.stages if one.choice.vehicle_name == vehicle)
         return next((one.clocks for one in aboard if one.clocks), ())
@@ -198,7 +198,7 @@ def _is_bare(text: str) -> bool:
     return len(text.split()) == 1
 
 
-def _named(candidates: tuple[Candidate[E], ...], identity: str | None) -> E | None:
+def _named(candidates: tuple[CandidateEntry[E], ...], identity: str | None) -> E | None:
     return next((one.entry for one in candidates if one.id == identity), None)
 
 
@@ -216,13 +216,17 @@ def _stage(case: Case, index: int) -> StageCase:
             if (role := choice.role(name)) is not None and not role.is_empty
         ),
         tuple(
-            _bought(case, Candidate(one, catalog.clocks[one], origins.get(("clocks", one), "")))
+            _bought(
+                case, CandidateEntry(one, catalog.clocks[one], origins.get(("clocks", one), ""))
+            )
             for one in named
         ),
     )
 
 
-def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candidate[PlatformEntry]:
+def _platform(
+    stage: StageChoice, catalog: Catalog, origins: Origins
+) -> CandidateEntry[PlatformEntry]:
     """The platform with the spec's keys put over the catalog's."""
     choice: PlatformChoice = stage.platform
     own = {
@@ -233,9 +237,9 @@ def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candida
     if stage.distance is not None:  # figures of the platform are those at the far end
         own["distance"] = ends_of(stage.distance)[1]
     if choice.use is None:
-        return Candidate(choice.name or stage.name, PlatformEntry.model_validate(own))
+        return CandidateEntry(choice.name or stage.name, PlatformEntry.model_validate(own))
     entry = catalog.platforms[choice.use].model_copy(update=own)
-    return Candidate(choice.use, entry, origins.get(("platforms", choice.use), ""))
+    return CandidateEntry(choice.use, entry, origins.get(("platforms", choice.use), ""))
 
 
 def _role(
@@ -261,7 +265,7 @@ def _role(
         choice,
         tuple(one for one in sensors if one.id not in without),
         tuple(
-            Candidate(one, listed[one], case.origins.get(("timestamping", one), ""))
+            CandidateEntry(one, listed[one], case.origins.get(("timestamping", one), ""))
             for one in methods
         ),
         inline,
@@ -270,7 +274,7 @@ def _role(
 
 
 def _incomplete(
-    case: Case, choice: RoleChoice, sensors: tuple[Candidate[SensorEntry], ...]
+    case: Case, choice: RoleChoice, sensors: tuple[CandidateEntry[SensorEntry], ...]
 ) -> tuple[tuple[str, str], ...]:
     """What a query finds without a figure that is due, unless nothing else answers it.
 
@@ -299,9 +303,9 @@ def figures_due(spec: Spec, is_open: bool) -> dict[str, str]:
 
 def _sensors(
     case: Case, stage: StageChoice, role: RoleName, choice: RoleChoice
-) -> tuple[Candidate[SensorEntry], ...]:
+) -> tuple[CandidateEntry[SensorEntry], ...]:
     if isinstance(choice.sensor, SensorEntry):  # named by itself, or by stage and role
-        given = Candidate(choice.sensor.name or f"{stage.name}.{role}", choice.sensor)
+        given = CandidateEntry(choice.sensor.name or f"{stage.name}.{role}", choice.sensor)
         return (_bought(case, given),)
     listed = case.catalog.sensors
     named: tuple[str, ...]
@@ -313,7 +317,7 @@ def _sensors(
     else:
         named = choice.candidates or ()
     return tuple(
-        _bought(case, Candidate(one, listed[one], case.origins.get(("sensors", one), "")))
+        _bought(case, CandidateEntry(one, listed[one], case.origins.get(("sensors", one), "")))
         for one in named
     )
 
@@ -325,7 +329,7 @@ def _answers(case: Case, query: Query, identity: str, entry: SensorEntry, role: 
     return matches(query, entry, role, case.spec)
 
 
-def _bought(case: Case, one: Candidate[P]) -> Candidate[P]:
+def _bought(case: Case, one: CandidateEntry[P]) -> CandidateEntry[P]:
     """A candidate as the spec has to pay for it: at no cost where it is owned."""
     if one.id not in case.spec.owned:
         return one
@@ -347,13 +351,15 @@ def matches(query: Query, entry: SensorEntry, role: RoleName, spec: Spec) -> boo
 
 def _hardware(
     case: Case, stages: tuple[StageCase, ...]
-) -> Mapping[str, Candidate[InfrastructureEntry]]:
+) -> Mapping[str, CandidateEntry[InfrastructureEntry]]:
     """Shared hardware that a candidate method or clock requires."""
     methods = (one.entry for stage in stages for role in stage.roles for one in role.methods)
     required = {name for method in methods for name in method.requires}
     required |= {name for stage in stages for one in stage.clocks for name in one.entry.requires}
     return {
-        name: _bought(case, Candidate(name, entry, case.origins.get(("infrastructure", name), "")))
+        name: _bought(
+            case, CandidateEntry(name, entry, case.origins.get(("infrastructure", name), ""))
+        )
         for name, entry in case.catalog.infrastructure.items()
         if name in required
     }

@@ -32,15 +32,15 @@ from syncline_design.spec.fields import (
     FileRecord,
     Mass,
     Money,
+    NonEmptyText,
     NonNegativeLength,
     NonNegativeTime,
     PositiveLength,
     PositiveTime,
     Power,
     Ratio,
-    Reader,
+    ReadBy,
     Speed,
-    Text,
     Time,
     axes,
     did_you_mean,
@@ -81,7 +81,7 @@ def _read_basis(value: Any) -> Any:
 
 Basis = Annotated[
     Any,
-    Reader(
+    ReadBy(
         _read_basis,
         {
             "anyOf": [
@@ -96,7 +96,7 @@ Basis = Annotated[
 DriveArea = Annotated[Sigma, axes(Dimension.LENGTH, ("north", "east"))]
 
 
-class Entry(FileRecord):
+class EntryKeys(FileRecord):
     """What every catalog entry may say about itself."""
 
     name: str = ""
@@ -104,10 +104,10 @@ class Entry(FileRecord):
     basis: Basis | None = None  # "assumption", or per figure: {cost: assumption}
     note: str = ""
     figures: Figures  # what sources print, by figure or by part: sigma_attitude.yaw
-    unusual: dict[str, Text] = Field(default_factory=dict)  # figure to why it stands apart
+    unusual: dict[str, NonEmptyText] = Field(default_factory=dict)  # figure to why it stands apart
 
     @model_validator(mode="after")
-    def _names_figures(self) -> Entry:
+    def _names_figures(self) -> EntryKeys:
         known = [name for name in type(self).model_fields if name not in _ABOUT]
         named = self.basis if isinstance(self.basis, dict) else {}
         if not named and not self.figures and not self.unusual:
@@ -151,7 +151,7 @@ _ABOUT = frozenset({"name", "source", "basis", "note", "figures", "unusual"})
 _NOT_FIGURES = _ABOUT | {"modality", "type", "timeline", "lifecycle"}
 
 
-class Product(Entry):
+class Product(EntryKeys):
     """What can be bought."""
 
     needs: tuple[Need, ...] = ()
@@ -179,7 +179,7 @@ class Product(Entry):
         return self.model_copy(update=changes)
 
 
-class PlatformEntry(Entry):
+class PlatformEntry(EntryKeys):
     v_max: Speed
     omega_max: AngularRate
     distance: PositiveLength
@@ -205,7 +205,7 @@ def _read_range_sigma(value: Any) -> Quantity:
 
 RangeSigma = Annotated[
     float,
-    Reader(_read_range_sigma, {"anyOf": [_RANGE_SCHEMA, table_schema(Dimension.LENGTH)]}),
+    ReadBy(_read_range_sigma, {"anyOf": [_RANGE_SCHEMA, table_schema(Dimension.LENGTH)]}),
 ]
 _BEARING = axes(Dimension.ANGLE, ("azimuth", "elevation"))
 
@@ -218,7 +218,7 @@ def _read_bearing_sigma(value: Any) -> Any:
 
 BearingSigma = Annotated[
     Sigma,
-    Reader(
+    ReadBy(
         _read_bearing_sigma,
         {"anyOf": [*_BEARING.schema["anyOf"], table_schema(Dimension.ANGLE)]},
     ),
@@ -321,7 +321,7 @@ class EmpiricalError(MeasuredKeys):
     """Measured values, given here or in a file (one per line) whose values loading puts here."""
 
     distribution: Literal["empirical"]
-    values: Annotated[tuple[float, ...], Reader(_read_times, _TIMES_SCHEMA)] | None = None
+    values: Annotated[tuple[float, ...], ReadBy(_read_times, _TIMES_SCHEMA)] | None = None
     file: str | None = None
     calibrated: NonNegativeTime | None = None
 
@@ -400,11 +400,11 @@ class ClockEntry(Product):
 class Catalog(FileRecord):
     """All entries of one file, or of several merged."""
 
-    platforms: dict[Text, PlatformEntry] = Field(default_factory=dict)
-    sensors: dict[Text, SensorEntry] = Field(default_factory=dict)
-    timestamping: dict[Text, TimestampingEntry] = Field(default_factory=dict)
-    infrastructure: dict[Text, InfrastructureEntry] = Field(default_factory=dict)
-    clocks: dict[Text, ClockEntry] = Field(default_factory=dict)
+    platforms: dict[NonEmptyText, PlatformEntry] = Field(default_factory=dict)
+    sensors: dict[NonEmptyText, SensorEntry] = Field(default_factory=dict)
+    timestamping: dict[NonEmptyText, TimestampingEntry] = Field(default_factory=dict)
+    infrastructure: dict[NonEmptyText, InfrastructureEntry] = Field(default_factory=dict)
+    clocks: dict[NonEmptyText, ClockEntry] = Field(default_factory=dict)
 
 
 SECTIONS = tuple(Catalog.model_fields)
@@ -413,4 +413,4 @@ SECTIONS = tuple(Catalog.model_fields)
 class CatalogFile(Catalog):
     """One catalog file: entries, and further catalog files it draws in."""
 
-    catalogs: tuple[Text, ...] = ()
+    catalogs: tuple[NonEmptyText, ...] = ()

@@ -16,11 +16,11 @@ from statistics import median
 from typing import Annotated, Any, Final, Literal
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.conversion import conversion_of, printed_value
 from syncline_design.model.figure_text import format_like, to_digits
 from syncline_design.model.quantity import UnitError
-from syncline_design.spec.catalog import SECTIONS, Catalog, Entry, Product, SensorEntry
+from syncline_design.spec.catalog import SECTIONS, Catalog, EntryKeys, Product, SensorEntry
 from syncline_design.spec.facts import (
     AXES,
     PARTS,
@@ -78,7 +78,7 @@ class CatalogFlaw(Record):
 class CatalogCheck(Record):
     """What was looked at and what was found."""
 
-    schema: Annotated[str, Named(SCHEMA)]
+    schema: Annotated[str, SchemaName(SCHEMA)]
     files: tuple[str, ...]
     entries: int
     findings: tuple[CatalogFlaw, ...]
@@ -183,7 +183,7 @@ def _ids(one: _Place) -> Iterator[CatalogFlaw]:
 
 def _sources(one: _Place) -> Iterator[CatalogFlaw]:
     """Figures that neither a source nor a basis accounts for."""
-    entry: Entry = one.entry
+    entry: EntryKeys = one.entry
     if entry.source:
         return
     printed = {split_figure(key)[0] for key in entry.figures}
@@ -202,7 +202,7 @@ def _is_nothing(value: Any) -> bool:
     return isinstance(value, float) and value == 0.0
 
 
-def _has_basis(entry: Entry, key: str) -> bool:
+def _has_basis(entry: EntryKeys, key: str) -> bool:
     if entry.basis_of(key) is not None:
         return True
     return any(entry.basis_of(f"{key}.{part}") for part in PARTS.get(key, ()))

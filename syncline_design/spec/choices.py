@@ -22,11 +22,11 @@ from syncline_design.spec.fields import (
     AngularRate,
     FileRecord,
     Money,
+    NonEmptyText,
     NonNegativeLength,
     PositiveLength,
     PositiveSpeed,
     Speed,
-    Text,
     Vector,
     YesNo,
     kind_of,
@@ -47,7 +47,7 @@ PLATFORM_FIGURES = (
 class PlatformChoice(FileRecord):
     """A catalog id (`use`) with keys overridden, or all keys given."""
 
-    use: Text | None = None
+    use: NonEmptyText | None = None
     name: str | None = None
     v_max: Speed | None = None
     omega_max: AngularRate | None = None
@@ -78,7 +78,7 @@ class Query(FileRecord):
     """A catalog query: every key given must match."""
 
     modality: RoleName | None = None
-    type: Text | None = None
+    type: NonEmptyText | None = None
     max_cost: Money | None = None
 
 
@@ -201,12 +201,12 @@ def _widen_platform(value: Any) -> Any:
 class StageChoice(FileRecord):
     """One vehicle that georeferences something."""
 
-    name: Text
+    name: NonEmptyText
     platform: Annotated[
         PlatformChoice,
         BeforeValidator(_widen_platform, json_schema_input_type=str | PlatformChoice),
     ]
-    vehicle: Text | None = None
+    vehicle: NonEmptyText | None = None
     position: RoleChoice | None = None
     attitude: RoleChoice | None = None
     ranging: RoleChoice | None = None
@@ -221,7 +221,7 @@ class StageChoice(FileRecord):
     temperature: TemperatureInterval | None = None
     reflectivity: Reflectivity | None = None  # of the object
     sound_speed: PositiveSpeed | None = None  # in the water; None: 1500 m/s
-    timing_from: Text | None = None  # stage that GNSS time comes from, by a cable
+    timing_from: NonEmptyText | None = None  # stage that GNSS time comes from, by a cable
     distance: DistanceInterval | None = None  # NEAR .. FAR: every distance between counts
     note: str = ""
 

@@ -17,8 +17,8 @@ from syncline_design.model.quantity import (
 )
 from syncline_design.spec.fields import (
     FileRecord,
-    Reader,
-    Text,
+    NonEmptyText,
+    ReadBy,
     kind_of,
     read_number,
     read_quantity,
@@ -89,12 +89,12 @@ class EffectChoice(FileRecord):
     Stored in SI under the name with the SI suffix: `latency_ms: 87` reads as latency_s = 0.087.
     """
 
-    effect: Text
+    effect: NonEmptyText
     sensor: Literal["position", "attitude", "ranging", "target"]
-    stage: Text | None = None
-    parameters: Annotated[dict[str, float | str], Reader(_read_parameters, _ParameterSchema)]
+    stage: NonEmptyText | None = None
+    parameters: Annotated[dict[str, float | str], ReadBy(_read_parameters, _ParameterSchema)]
     standard_uncertainty: Annotated[
-        dict[str, float], Reader(_read_uncertainties, _ParameterSchema)
+        dict[str, float], ReadBy(_read_uncertainties, _ParameterSchema)
     ] = Field(default_factory=dict)
     source: str = ""
     note: str = ""

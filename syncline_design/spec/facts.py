@@ -21,10 +21,10 @@ from syncline_design.model.conversion import conversion_of, kinds
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.fields import (
     FileRecord,
+    NonEmptyText,
     NonNegativeLength,
     PositiveLength,
-    Reader,
-    Text,
+    ReadBy,
     did_you_mean,
     figure_of,
     kind_of,
@@ -50,8 +50,8 @@ def _read_interval(value: Any, dimension: Dimension) -> Quantity:
     return quantity
 
 
-def _interval(dimension: Dimension) -> Reader:
-    return Reader(
+def _interval(dimension: Dimension) -> ReadBy:
+    return ReadBy(
         lambda value: _read_interval(value, dimension), quantity_schema(dimension, tolerance=True)
     )
 
@@ -72,7 +72,7 @@ def _read_span(value: Any) -> Quantity:
 
 
 DistanceInterval = Annotated[
-    Quantity, Reader(_read_span, quantity_schema(Dimension.LENGTH, tolerance=True))
+    Quantity, ReadBy(_read_span, quantity_schema(Dimension.LENGTH, tolerance=True))
 ]
 Rate = Annotated[float, figure_of(Dimension.FREQUENCY, 0.0, above=True)]
 
@@ -84,7 +84,7 @@ def _read_reflectivity(value: Any) -> Quantity:
     return share
 
 
-Reflectivity = Annotated[float, Reader(_read_reflectivity, quantity_schema(Dimension.RATIO))]
+Reflectivity = Annotated[float, ReadBy(_read_reflectivity, quantity_schema(Dimension.RATIO))]
 
 
 def _read_far_end(value: Any) -> Quantity | dict[str, Quantity]:
@@ -111,7 +111,7 @@ def _read_far_end(value: Any) -> Quantity | dict[str, Quantity]:
 
 _LENGTH = quantity_schema(Dimension.LENGTH)
 _TABLE = {"type": "object", "additionalProperties": _LENGTH}
-FarEnd = Annotated[float | dict[str, float], Reader(_read_far_end, {"anyOf": [_LENGTH, _TABLE]})]
+FarEnd = Annotated[float | dict[str, float], ReadBy(_read_far_end, {"anyOf": [_LENGTH, _TABLE]})]
 
 
 class Reach(FileRecord):
@@ -229,7 +229,7 @@ def _read_date(value: Any) -> str:
         raise refusal("not a date", "a date such as 2026-11-22", kind_of(value)) from None
 
 
-Day = Annotated[str, Reader(_read_date, {"type": "string", "format": "date"})]
+Day = Annotated[str, ReadBy(_read_date, {"type": "string", "format": "date"})]
 
 
 class Lifecycle(FileRecord):
@@ -238,7 +238,7 @@ class Lifecycle(FileRecord):
     status: Literal["active", "discontinued", "announced"]
     read: Day
     source: str = ""
-    successor: Text | None = None  # id of the entry that follows it
+    successor: NonEmptyText | None = None  # id of the entry that follows it
     note: str = ""
 
 
@@ -256,9 +256,9 @@ class PrintedFigure(FileRecord):
     which condition it holds; source and address: what was read; read: on which day.
     """
 
-    figure: Text
-    kind: Annotated[str, Reader(_read_kind, {"type": "string"})]
-    source: Text
+    figure: NonEmptyText
+    kind: Annotated[str, ReadBy(_read_kind, {"type": "string"})]
+    source: NonEmptyText
     read: Day
     address: str = ""
     over: PositiveLength | None = None

@@ -173,7 +173,7 @@ def quantity_schema(dimension: Dimension, tolerance: bool = False) -> dict[str, 
 
 
 @dataclass(frozen=True, eq=False)  # by identity: typing hashes annotations
-class Reader:
+class ReadBy:
     """Field annotation: how a value is read from a file, and its JSON Schema."""
 
     read: Callable[[Any], Any]
@@ -188,11 +188,11 @@ class Reader:
 
 def figure_of(
     dimension: Dimension, lowest: float | None = None, above: bool = False, tolerance: bool = False
-) -> Reader:
+) -> ReadBy:
     def read(value: Any) -> Quantity:
         return read_quantity(value, dimension, lowest, above, tolerance)
 
-    return Reader(read, quantity_schema(dimension, tolerance))
+    return ReadBy(read, quantity_schema(dimension, tolerance))
 
 
 def _read_yes_no(value: Any) -> bool:
@@ -205,7 +205,7 @@ def _read_yes_no(value: Any) -> bool:
 
 
 YesNo = Annotated[
-    bool, Reader(_read_yes_no, {"anyOf": [{"enum": ["yes", "no"]}, {"type": "boolean"}]})
+    bool, ReadBy(_read_yes_no, {"anyOf": [{"enum": ["yes", "no"]}, {"type": "boolean"}]})
 ]
 PositiveLength = Annotated[float, figure_of(Dimension.LENGTH, 0.0, above=True)]
 NonNegativeLength = Annotated[float, figure_of(Dimension.LENGTH, 0.0)]
@@ -225,11 +225,11 @@ PositiveMoney = Annotated[Quantity, figure_of(Dimension.MONEY, 0.0, above=True)]
 Ratio = Annotated[float, figure_of(Dimension.RATIO, 0.0)]
 
 
-def _number(lowest: float) -> Reader:
+def _number(lowest: float) -> ReadBy:
     def read(value: Any) -> Quantity:
         return read_number(value, lowest, above=True)
 
-    return Reader(read, {"type": "number", "exclusiveMinimum": lowest})
+    return ReadBy(read, {"type": "number", "exclusiveMinimum": lowest})
 
 
 PositiveNumber = Annotated[float, _number(0.0)]
@@ -243,11 +243,11 @@ def _refuse_empty(value: Any) -> Any:
 
 
 AtLeastOne = BeforeValidator(_refuse_empty)
-Text = Annotated[str, Field(min_length=1)]
+NonEmptyText = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=1)]
 
 
-def axes(dimension: Dimension, names: tuple[str, ...]) -> Reader:
+def axes(dimension: Dimension, names: tuple[str, ...]) -> ReadBy:
     """Standard deviations: one figure for every axis, or one per axis in the order of `names`."""
     count = len(names)
 
@@ -264,7 +264,7 @@ def axes(dimension: Dimension, names: tuple[str, ...]) -> Reader:
 
     schema = quantity_schema(dimension, tolerance=True)
     several = {"type": "array", "items": schema, "minItems": count, "maxItems": count}
-    return Reader(read, {"anyOf": [schema, several]})
+    return ReadBy(read, {"anyOf": [schema, several]})
 
 
 def _each(values: Iterable[Any], read: Callable[[Any], T]) -> list[T]:
@@ -323,7 +323,7 @@ def _read_vector(value: Any) -> tuple[Quantity, ...]:
 
 Vector = Annotated[
     tuple[float, float, float],
-    Reader(
+    ReadBy(
         _read_vector,
         {
             "type": "array",

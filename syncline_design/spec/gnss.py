@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator
 from itertools import pairwise
 
-from syncline_design.spec.case import Candidate, Case
+from syncline_design.spec.case import CandidateEntry, Case
 from syncline_design.spec.catalog import ClockEntry, SensorEntry, TimestampingEntry
 from syncline_design.spec.choices import StageChoice
 from syncline_design.spec.existence import RuledOut
@@ -65,7 +65,9 @@ def is_receiver(kind: str) -> bool:
     )
 
 
-def deaf_sensor(case: Case, stage: StageChoice, sensor: Candidate[SensorEntry]) -> RuledOut | None:
+def deaf_sensor(
+    case: Case, stage: StageChoice, sensor: CandidateEntry[SensorEntry]
+) -> RuledOut | None:
     """Why a sensor would not hear on a stage; None where it needs no GNSS, or there is some."""
     needs = "gnss" in sensor.entry.needs or is_receiver(sensor.entry.type)
     if not needs or has_gnss(case.spec, stage):
@@ -76,7 +78,7 @@ def deaf_sensor(case: Case, stage: StageChoice, sensor: Candidate[SensorEntry]) 
 
 
 def untimed_method(
-    case: Case, stage: StageChoice, method: Candidate[TimestampingEntry]
+    case: Case, stage: StageChoice, method: CandidateEntry[TimestampingEntry]
 ) -> RuledOut | None:
     """Why a timestamping method lacks GNSS time on a stage; None where it does not."""
     if not _needs_gnss(case, method.entry) or has_gnss_time(case.spec, stage):
@@ -84,7 +86,7 @@ def untimed_method(
     return _without_time(stage.name, method.id, _why(case.spec, stage))
 
 
-def untimed_clock(case: Case, vehicle: str, clock: Candidate[ClockEntry]) -> RuledOut | None:
+def untimed_clock(case: Case, vehicle: str, clock: CandidateEntry[ClockEntry]) -> RuledOut | None:
     """Why a clock lacks GNSS time on a vehicle; None where it does not."""
     spec = case.spec
     stages = [stage for stage in spec.stages if stage.vehicle_name == vehicle]

@@ -11,8 +11,8 @@ from pydantic_core import PydanticCustomError
 from syncline_design.model.quantity import UNITS, Dimension, Quantity, suffix_unit
 from syncline_design.spec.fields import (
     FileRecord,
-    Reader,
-    Text,
+    NonEmptyText,
+    ReadBy,
     did_you_mean,
     kind_of,
     quantity_schema,
@@ -57,7 +57,7 @@ def _read_place(value: Any) -> tuple[Quantity, ...]:
 
 Place = Annotated[
     tuple[float, float, float],
-    Reader(
+    ReadBy(
         _read_place,
         {
             "type": "array",
@@ -77,13 +77,13 @@ Place = Annotated[
 class StreamChoice(FileRecord):
     """Which stream of a log plays which part: a topic, a message or a file, by name."""
 
-    position: Text | None = None
-    attitude: Text | None = None
-    velocity: Text | None = None
-    rate: Text | None = None
-    ranging: Text | None = None
-    target: Text | None = None
-    reference: Text | None = None
+    position: NonEmptyText | None = None
+    attitude: NonEmptyText | None = None
+    velocity: NonEmptyText | None = None
+    rate: NonEmptyText | None = None
+    ranging: NonEmptyText | None = None
+    target: NonEmptyText | None = None
+    reference: NonEmptyText | None = None
 
 
 class LogChoice(FileRecord):
@@ -94,8 +94,8 @@ class LogChoice(FileRecord):
     frame, body, timeline, gps_week: of streams that do not say so themselves.
     """
 
-    columns: dict[Text, Text] = Field(default_factory=dict)
-    files: tuple[Text, ...] = ()
+    columns: dict[NonEmptyText, NonEmptyText] = Field(default_factory=dict)
+    files: tuple[NonEmptyText, ...] = ()
     origin: Place | None = None
     streams: StreamChoice = Field(default_factory=StreamChoice)
     frame: Literal["enu", "ned"] | None = None

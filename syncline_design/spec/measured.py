@@ -13,10 +13,10 @@ from pydantic import Field, model_validator
 from syncline_design.spec.fields import (
     Count,
     FileRecord,
+    NonEmptyText,
     NonNegativeTime,
     PositiveTime,
-    Reader,
-    Text,
+    ReadBy,
     kind_of,
     refusal,
     refusals,
@@ -31,7 +31,7 @@ def _read_sha256(value: Any) -> str:
     return value
 
 
-Sha256 = Annotated[str, Reader(_read_sha256, {"type": "string", "pattern": "^[0-9a-f]{64}$"})]
+Sha256 = Annotated[str, ReadBy(_read_sha256, {"type": "string", "pattern": "^[0-9a-f]{64}$"})]
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
@@ -48,8 +48,8 @@ class MeasuredClaim(FileRecord):
     sessions: Count | None = None
     hours: Annotated[float, Field(ge=0.0)] | None = None
     session_length: PositiveTime | None = None
-    rests_on: Text | None = None
-    declared: dict[Text, NonNegativeTime] = Field(default_factory=dict)
+    rests_on: NonEmptyText | None = None
+    declared: dict[NonEmptyText, NonNegativeTime] = Field(default_factory=dict)
     made: bool | None = None
     needs_sessions: Annotated[int, Field(ge=0)] | None = None
 
@@ -63,17 +63,17 @@ class MeasuredClaim(FileRecord):
         return 3600.0 * float(self.hours) / self.sessions
 
 
-class EvidenceFile(FileRecord):
+class MeasuredLog(FileRecord):
     """A log that the figures rest on."""
 
-    file: Text
+    file: NonEmptyText
     sha256: Sha256
 
 
 class MeasuredEvent(FileRecord):
     """What was no steady state: how often and how large, or one event with its time."""
 
-    kind: Text
+    kind: NonEmptyText
     count: Count | None = None
     largest: NonNegativeTime | None = None
     size: NonNegativeTime | None = None
@@ -87,7 +87,7 @@ class MeasuredKeys(FileRecord):
 
     bound: NonNegativeTime | None = None
     claim: MeasuredClaim | None = None
-    evidence: tuple[EvidenceFile, ...] = ()
+    evidence: tuple[MeasuredLog, ...] = ()
     conditions: str | None = None
     events: tuple[MeasuredEvent, ...] = ()
 

@@ -16,7 +16,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_quantity, to_digits
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.roles import ROLES
-from syncline_design.spec.case import Candidate, Case, StageCase
+from syncline_design.spec.case import CandidateEntry, Case, StageCase
 from syncline_design.spec.catalog import PlatformEntry, SensorEntry
 from syncline_design.spec.catalog_check import FACTOR, FEWEST_SIBLINGS, size_of
 from syncline_design.spec.facts import SIGMA_DIMENSIONS
@@ -42,7 +42,9 @@ class Implausible:
     reason: str
 
 
-def implausible(case: Case, sensors: Iterable[Candidate[SensorEntry]]) -> Iterator[Implausible]:
+def implausible(
+    case: Case, sensors: Iterable[CandidateEntry[SensorEntry]]
+) -> Iterator[Implausible]:
     """What of a spec, and of some sensors that it may use, is hardly meant."""
     for stage in case.stages:
         yield from _platform(case, stage)

@@ -15,7 +15,7 @@ from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.fields import (
     FileRecord,
-    Text,
+    NonEmptyText,
     read_number,
     read_quantity,
     refusal,
@@ -103,7 +103,7 @@ def read_distance_limit(value: Mapping[str, Any]) -> DistanceLimit:
 class Waiver(FileRecord):
     """Why a requirement may be missed, and until when."""
 
-    reason: Text
+    reason: NonEmptyText
     expires: str  # a date, 2027-01-31; the requirement counts again after it
 
     @reads_field("expires", mode="after")
@@ -123,7 +123,7 @@ class Waiver(FileRecord):
 class Requirement(FileRecord):
     """One requirement; limit is a Quantity of the kind's dimension (a bare number for sync)."""
 
-    id: Text
+    id: NonEmptyText
     kind: Literal[
         "accuracy", "sync", "cost", "mass", "power", "monte_carlo",
         "worst_case", "thu", "tvu", "rmse", "quantile", "sample_spacing",

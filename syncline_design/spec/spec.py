@@ -18,13 +18,13 @@ from syncline_design.spec.effects_listed import EffectChoice as EffectChoice
 from syncline_design.spec.fields import (
     AtLeastOne,
     FileRecord,
+    NonEmptyText,
     NonNegativeAngle,
     NonNegativeLength,
     NonNegativeTime,
     PositiveMoney,
     PositiveNumber,
-    Reader,
-    Text,
+    ReadBy,
     YesNo,
     did_you_mean,
     kind_of,
@@ -50,8 +50,8 @@ MOST_EFFECTS = 1_000  # each acts on every simulated sample; a system is known b
 class Trajectory(FileRecord):
     """What the vehicles do in a Monte Carlo run: a named manoeuvre, or a recorded track."""
 
-    manoeuvre: Text | None = None
-    file: Text | None = None
+    manoeuvre: NonEmptyText | None = None
+    file: NonEmptyText | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> Trajectory:
@@ -107,7 +107,7 @@ class HorizonChoice(FileRecord):
 class MissionChoice(FileRecord):
     """One mission: keys of stages by their names, limits (or keys) of requirements by their ids."""
 
-    name: Text
+    name: NonEmptyText
     stages: dict[str, dict[str, Any]] = Field(default_factory=dict)
     requirements: dict[str, Any] = Field(default_factory=dict)
     note: str = ""
@@ -128,7 +128,7 @@ def _read_choose_for(value: Any) -> str | Quantity:
 _HOW = ("nominal", "always")
 ChooseFor = Annotated[
     str | float,
-    Reader(
+    ReadBy(
         _read_choose_for,
         {"anyOf": [{"enum": list(_HOW)},
                    {"type": "number", "exclusiveMinimum": 0.5, "exclusiveMaximum": 1}]},
@@ -140,9 +140,9 @@ class Spec(FileRecord):
     """One system: its requirements, stages, and how the choice is made."""
 
     syncline: Literal[1]
-    name: Text
+    name: NonEmptyText
     note: str = ""
-    catalogs: tuple[Text, ...] = ()
+    catalogs: tuple[NonEmptyText, ...] = ()
     currency: Literal["EUR", "USD", "GBP", "NOK", "SEK", "DKK", "CHF", "CAD", "AUD", "JPY"] = "EUR"
     exchange_rates: dict[str, PositiveMoney] = Field(default_factory=dict)  # {USD: 0.92 EUR}
     requirements: Annotated[
@@ -156,7 +156,7 @@ class Spec(FileRecord):
     coverage_factor: PositiveNumber = 3.0
     strict_facts: YesNo = False  # a fact that is asked for and not told rules out
     allow_discontinued: YesNo = False
-    owned: tuple[Text, ...] = ()  # sensors, shared hardware and clocks that cost nothing
+    owned: tuple[NonEmptyText, ...] = ()  # sensors, shared hardware and clocks that cost nothing
     horizon: HorizonChoice = Field(default_factory=HorizonChoice)
     objective: Literal["cost", "mass", "power", "error"] = "cost"
     monte_carlo: MonteCarloChoice = Field(default_factory=MonteCarloChoice)

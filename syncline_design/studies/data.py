@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from syncline_design import __version__
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record
+from syncline_design.machine.records import Record, SchemaName
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import MeetsWhen
 from syncline_design.studies.finished import Finished
@@ -15,8 +15,8 @@ from syncline_design.studies.loading import Study
 from syncline_design.studies.record import CaseWord, StudyWord
 from syncline_design.studies.summary import (
     Boundary,
-    Front,
     HeatMap,
+    StudyFront,
     Winner,
     boundaries,
     heat_map,
@@ -61,7 +61,7 @@ class StudyProvenance(Record):
 class StudyData(Record):
     """A finished study; cases: the rows of its table, what a case lacks null or left out."""
 
-    schema: Annotated[str, Named(SCHEMA)]
+    schema: Annotated[str, SchemaName(SCHEMA)]
     verdict: StudyWord
     name: str
     file: str
@@ -72,7 +72,7 @@ class StudyData(Record):
     heat_map: HeatMap | None
     winners: tuple[Winner, ...]
     boundaries: tuple[Boundary, ...]
-    fronts: tuple[Front, ...]
+    fronts: tuple[StudyFront, ...]
     cases: tuple[Mapping[str, Value], ...]
     provenance: StudyProvenance
 

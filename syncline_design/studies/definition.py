@@ -16,7 +16,14 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import UNITS, Dimension, UnitError, parse_number
-from syncline_design.spec.fields import AtLeastOne, FileRecord, PositiveTime, Text, kind_of, refusal
+from syncline_design.spec.fields import (
+    AtLeastOne,
+    FileRecord,
+    NonEmptyText,
+    PositiveTime,
+    kind_of,
+    refusal,
+)
 from syncline_design.spec.keys import label
 from syncline_design.spec.yaml_text import plain_scalar
 
@@ -103,18 +110,21 @@ class CheckChoice(FileRecord):
 class HeatMapChoice(FileRecord):
     """The two key paths of the heat map."""
 
-    x: Text
-    y: Text
+    x: NonEmptyText
+    y: NonEmptyText
 
 
 class StudyFile(FileRecord):
     """A study as its file says it; meets_when: which cases have to meet their requirements."""
 
     study: Literal[1]
-    name: Text
+    name: NonEmptyText
     note: str = ""
     base: Annotated[
-        tuple[Text, ...], AtLeastOne, BeforeValidator(_read_base), WithJsonSchema(_BASE_SCHEMA)
+        tuple[NonEmptyText, ...],
+        AtLeastOne,
+        BeforeValidator(_read_base),
+        WithJsonSchema(_BASE_SCHEMA),
     ]
     grid: Grid | None = None
     sample: SampleChoice | None = None

@@ -68,7 +68,7 @@ def _work(connection: Connection) -> None:
             connection.send((index, encoded_case(study, index, settings)))
 
 
-class Pool:
+class WorkerPool:
     """A fixed number of workers over one study."""
 
     def __init__(self, study: Study, settings: CaseSettings, workers: int) -> None:

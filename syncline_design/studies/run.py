@@ -17,7 +17,7 @@ from syncline_design.studies.case import CaseSettings, case_keys
 from syncline_design.studies.cluster import ClusterError, run_on_cluster
 from syncline_design.studies.inputs import Looked, full_key
 from syncline_design.studies.loading import Study, load_study
-from syncline_design.studies.pool import Pool, PoolError, Result, encoded_case
+from syncline_design.studies.pool import PoolError, Result, WorkerPool, encoded_case
 from syncline_design.studies.record import CaseRecord
 from syncline_design.studies.result import Progress, Report, StudyResult
 from syncline_design.studies.store import FOLDER, Store, StoreError
@@ -164,7 +164,7 @@ class _Run:
                 in_force().check()
                 yield index, encoded
         else:
-            pool = Pool(self.study, self.shared, settings.workers)
+            pool = WorkerPool(self.study, self.shared, settings.workers)
             for result in pool.run(missing):
                 self.retried = pool.retried
                 yield result

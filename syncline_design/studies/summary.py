@@ -37,7 +37,7 @@ class Brief:
 
 
 @dataclass(frozen=True, slots=True)
-class Front(Record):
+class StudyFront(Record):
     """One exact front of cost against error; cases: the numbers of those that share it."""
 
     cases: tuple[int, ...]
@@ -51,7 +51,7 @@ class StudySummary:
 
     result: Finished
     briefs: tuple[Brief, ...]
-    fronts: tuple[Front, ...]
+    fronts: tuple[StudyFront, ...]
 
     @property
     def currencies(self) -> tuple[str, ...]:
@@ -113,7 +113,9 @@ def summarise(result: Finished) -> StudySummary:
         key = (points, case.currency)
         if points and (key in fronts or len(fronts) < MOST_FRONTS):
             fronts.setdefault(key, []).append(case.number)
-    found = (Front(tuple(cases), currency, points) for (points, currency), cases in fronts.items())
+    found = (
+        StudyFront(tuple(cases), currency, points) for (points, currency), cases in fronts.items()
+    )
     return StudySummary(result, tuple(briefs), tuple(found))
 
 

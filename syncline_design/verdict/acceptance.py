@@ -19,7 +19,7 @@ from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.options import Option
 from syncline_design.choice.outcome import Unfinished
-from syncline_design.choice.table import Cut, Design, Judge, Judgement, Problem, RoleTable
+from syncline_design.choice.table import Cut, Design, Judge, Problem, RoleTable, SimulatedJudgement
 from syncline_design.effects import registry
 from syncline_design.machine.input_files import FileContent
 from syncline_design.machine.quick_dataclass import dataclass
@@ -215,7 +215,7 @@ class _SpecJudge:
         own = [one for one in self.simulations.learned if one.case is self.case]
         return [one.cut(problem, limits.get(one.requirement, math.inf)) for one in own[known:]]
 
-    def judge(self, problem: Problem, design: Design) -> Judgement:
+    def judge(self, problem: Problem, design: Design) -> SimulatedJudgement:
         """Every limit in turn; the first that fails settles it."""
         limits = dict(self.limits)
         for one in self.simulations.learned:
@@ -225,7 +225,7 @@ class _SpecJudge:
                 and limit is not None
                 and one.rules_out(problem, design, limit)
             ):
-                return Judgement(failed=(one.requirement,))
+                return SimulatedJudgement(failed=(one.requirement,))
         left_open: list[str] = []
         system, grown = self._system(problem, design)
         what_if = grown or self.case is not self.simulations.asked
@@ -233,9 +233,9 @@ class _SpecJudge:
             status = self._status(system, name, limit, what_if=what_if)
             if status == "fail":
                 self._learn(system, name)
-                return Judgement(failed=(name,))
+                return SimulatedJudgement(failed=(name,))
             left_open += [name] if status == "indeterminate" else []
-        return Judgement(undecided=tuple(left_open))
+        return SimulatedJudgement(undecided=tuple(left_open))
 
     def _system(self, problem: Problem, design: Design) -> tuple[System, bool]:
         """The design's system, and whether it is not the spec's own.

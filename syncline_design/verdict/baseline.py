@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
-from syncline_design.verdict.since import Baseline, Earlier, RequirementSince, Since
+from syncline_design.verdict.since import Baseline, Earlier, RequirementSince, SinceBaseline
 from syncline_design.verdict.tree import RequirementResult, Verdict
 
 _OUTCOMES: Final = ("meets", "indeterminate", "fails", "infeasible")  # each worse than the last
@@ -52,7 +52,7 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
     for row in verdict.requirements:
         was = old.pop(row.id, None)
         if was is None:
-            change: Since = "new"
+            change: SinceBaseline = "new"
         elif None in (verdict.design, before.design):
             change = _without_design(verdict, before, row)
         else:
@@ -66,7 +66,7 @@ def _earlier(row: RequirementResult) -> Earlier:
     return Earlier(row.status, row.value, row.limit, row.unit, row.limit_written)
 
 
-def _without_design(verdict: Verdict, before: Verdict, row: RequirementResult) -> Since:
+def _without_design(verdict: Verdict, before: Verdict, row: RequirementResult) -> SinceBaseline:
     """Where one side has no design its rows have no figures: the verdict as a whole decides."""
     if row.status == "pass" or verdict.verdict == before.verdict:
         return "same"
@@ -77,7 +77,7 @@ def _fell(verdict: Verdict, before: Verdict) -> bool:
     return _OUTCOMES.index(verdict.verdict) > _OUTCOMES.index(before.verdict)
 
 
-def _since(now: RequirementResult, then: RequirementResult) -> Since:
+def _since(now: RequirementResult, then: RequirementResult) -> SinceBaseline:
     step = _standing(now) - _standing(then)
     if step == 0 and now.status == "fail" and now.unit == then.unit:
         step = _further(now, then) - _further(then, now)

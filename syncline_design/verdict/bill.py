@@ -33,10 +33,10 @@ def total(lines: tuple[BillLine, ...], name: str) -> float | None:
 
 
 # Stage or vehicle, use, id, entry, quantity, and whether it is owned already.
-Bought = tuple[str, str, str, Product, int, bool]
+Purchase = tuple[str, str, str, Product, int, bool]
 
 
-def _bought(case: Case, problem: Problem, design: Design) -> Iterator[Bought]:
+def _bought(case: Case, problem: Problem, design: Design) -> Iterator[Purchase]:
     for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
         role = case.stages[table.stage].role(table.role)
         assert role is not None

@@ -19,7 +19,7 @@ from syncline_design.verdict.design_data import full_design, named_design
 from syncline_design.verdict.named import (
     ChoiceResult,
     Exclusion,
-    Figure,
+    FactFigure,
     FrontByFigure,
     FrontDesign,
     RankedDesign,
@@ -212,6 +212,6 @@ def _excluded_clocks(problem: Problem) -> Iterator[Exclusion]:
             yield Exclusion(stage, "clock", gone.clock.id, None, None, *why)
 
 
-def _plain(figure: Figure) -> Figure:
+def _plain(figure: FactFigure) -> FactFigure:
     """JSON has no infinity."""
     return figure if isinstance(figure, str) else finite(figure)

@@ -15,7 +15,7 @@ from syncline_design.model.budget import Budget, SensorRow
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, RoleCase, StageCase
-from syncline_design.spec.catalog import Entry
+from syncline_design.spec.catalog import EntryKeys
 from syncline_design.spec.facts import AXES, Reach, split_figure
 from syncline_design.verdict.named import (
     HostClock,
@@ -33,7 +33,7 @@ class UsedEntry:
 
     section: str
     id: str
-    entry: Entry
+    entry: EntryKeys
 
 
 def number(amount: Fraction | None) -> float | None:
@@ -119,7 +119,7 @@ def _clocks(case: Case, problem: Problem, design: Design) -> Iterator[HostClock]
 
 def used_entries(case: Case, problem: Problem, design: Design) -> list[UsedEntry]:
     """Every catalog entry a design rests on, each once: platforms, sensors, methods, hardware."""
-    found: dict[tuple[str, str], Entry | None] = {
+    found: dict[tuple[str, str], EntryKeys | None] = {
         ("platforms", stage.platform.id): stage.platform.entry for stage in case.stages
     }
     for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
@@ -168,13 +168,13 @@ _WEIGHED = frozenset(
 )
 
 
-def _resting_on(entry: Entry, basis: str) -> list[str]:
+def _resting_on(entry: EntryKeys, basis: str) -> list[str]:
     """The figures of an entry that have a basis, in the order in which it names them."""
     figures = list(entry.basis) if isinstance(entry.basis, Mapping) else entry.told_figures()
     return [figure for figure in figures if entry.basis_of(figure) == basis]
 
 
-def _figure_text(entry: Entry, figure: str) -> str:
+def _figure_text(entry: EntryKeys, figure: str) -> str:
     """A figure of an entry, or the part of it that a name with a dot means."""
     name, part = split_figure(figure)
     value = getattr(entry, name, None)
@@ -209,7 +209,7 @@ def sources(entries: list[UsedEntry]) -> tuple[Source, ...]:
     return tuple(Source(used.id, used.section, source) for used, source in told if source)
 
 
-def told_source(entry: Entry) -> str:
+def told_source(entry: EntryKeys) -> str:
     """An entry's sources in one line: its own words, then those of its figures, each once."""
     by_source: dict[str, list[str]] = {}
     for key, one in entry.figures.items():

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from syncline_design.choice.family import Family, FamilyDesign, family_of
-from syncline_design.choice.family_best import FamilyPoint, Found, family_front, iter_family
+from syncline_design.choice.family_best import FamilyPoint, SummedDesign, family_front, iter_family
 from syncline_design.choice.family_parts import Whole, narrowed_family
 from syncline_design.choice.family_roads import choose_by_road, front_by_road, in_hand
 from syncline_design.choice.judged import judgement
@@ -23,13 +23,18 @@ from syncline_design.choice.outcome import OutOfTime, Proof, Road
 from syncline_design.choice.prices import resources_of
 from syncline_design.choice.problem import sole_design
 from syncline_design.choice.table import Design, Problem
-from syncline_design.choice.variations import SheetFigure, quantity, sigma_figures, with_figure
+from syncline_design.choice.variations import (
+    Build,
+    SheetFigure,
+    quantity,
+    sigma_figures,
+    with_figure,
+)
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, Mission
 from syncline_design.verdict.likely import Likelihood, likelihood_of
 
-Build = Callable[[Case], Problem]
 End = Literal["low", "high"]
 ALL = ""  # the mission of a spec that has none
 MERGED = Proof("front", optimal=True, rechecked=True)
@@ -73,7 +78,7 @@ class Chosen:
 
     designs: tuple[Design, ...]
     problems: tuple[Problem, ...]
-    found: Found | None = None
+    found: SummedDesign | None = None
     undecided: bool = False
     passed_open: int = 0  # better designs that are left open
     proof: Proof = MERGED
@@ -193,7 +198,7 @@ def _proven(work: Work, method: Road) -> Chosen | None:
     return None
 
 
-def accepted(work: Work, left_open: list[FamilyDesign] | None = None) -> Iterator[Found]:
+def accepted(work: Work, left_open: list[FamilyDesign] | None = None) -> Iterator[SummedDesign]:
     """Designs that meet every requirement of every mission, best first.
 
     left_open: takes in those that simulation leaves open.

@@ -8,9 +8,9 @@ from typing import TypeVar
 
 from syncline_design.choice.front import staircase
 from syncline_design.choice.outcome import TooLarge
+from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Pieces, in_force
 from syncline_design.verdict.family import (
-    Build,
     Chosen,
     Work,
     choose_family,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from syncline_design.choice.family import FamilyDesign
-from syncline_design.choice.family_best import FamilyPoint, Found, iter_family
+from syncline_design.choice.family_best import FamilyPoint, SummedDesign, iter_family
 from syncline_design.choice.family_parts import stated_family
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.table import Design, Problem
@@ -57,7 +57,7 @@ def family_figure_front(
         yield last
 
 
-def _first(work: Work, resource: ResourceName, failed: set[FamilyDesign]) -> Found | None:
+def _first(work: Work, resource: ResourceName, failed: set[FamilyDesign]) -> SummedDesign | None:
     """The first design in the order whose figure is below the limit; failed: those that are not,
     at this limit or a larger one, or that samples leave open."""
     part, whole = stated_family(work.family, resource)

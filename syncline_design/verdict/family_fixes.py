@@ -16,14 +16,13 @@ from syncline_design.choice.explain import by_size
 from syncline_design.choice.fixes import fix_of, moves_to, with_moves
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Conflict, ConflictMember, Fix, NoVerdict, OutOfTime
-from syncline_design.choice.parts import FIELDS, KINDS, Part
+from syncline_design.choice.parts import FIELDS, KINDS, ConflictPart
 from syncline_design.choice.table import Problem, with_limits
-from syncline_design.choice.variations import with_stage
+from syncline_design.choice.variations import Build, with_stage
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, Mission
 from syncline_design.verdict.family import (
     ALL,
-    Build,
     Chosen,
     Work,
     choose_family,
@@ -39,16 +38,16 @@ LARGEST_RATIO = 1e12
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class FamilyLimit:
     """One limit: of a mission, or (None) of what the whole family buys."""
 
     mission: str | None
-    part: Part
+    part: ConflictPart
 
 
-def asked_of(work: Work) -> tuple[Asked, ...]:
+def asked_of(work: Work) -> tuple[FamilyLimit, ...]:
     """Every limit that is held against sums; a budget is the family's."""
-    out: dict[tuple[str | None, str], Asked] = {}
+    out: dict[tuple[str | None, str], FamilyLimit] = {}
     for one in work.scenarios:
         limits = one.problem.limits
         names = dict(limits.ids)
@@ -56,7 +55,9 @@ def asked_of(work: Work) -> tuple[Asked, ...]:
             if kind == "sample_spacing" or _limit(one.problem, kind) in (None, math.inf):
                 continue
             mission = None if kind in RESOURCES else one.mission
-            out.setdefault((mission, kind), Asked(mission, Part(kind, names.get(kind))))
+            out.setdefault(
+                (mission, kind), FamilyLimit(mission, ConflictPart(kind, names.get(kind)))
+            )
     return tuple(out.values())
 
 
@@ -64,7 +65,7 @@ def _limit(problem: Problem, kind: str) -> Any:
     return getattr(problem.limits, FIELDS.get(kind, kind))
 
 
-def moved(work: Work, limits: dict[Asked, Any]) -> Work:
+def moved(work: Work, limits: dict[FamilyLimit, Any]) -> Work:
     """The family with other limits; None lifts one, infinity a sync limit."""
     problems = []
     for one in work.scenarios:
@@ -78,12 +79,12 @@ def moved(work: Work, limits: dict[Asked, Any]) -> Work:
     return with_problems(work, problems)
 
 
-def lifted(work: Work, some: Sequence[Asked]) -> Work:
+def lifted(work: Work, some: Sequence[FamilyLimit]) -> Work:
     """The family without some of its limits."""
     return moved(work, {one: math.inf if one.part.kind == "sync" else None for one in some})
 
 
-def conflict_of(work: Work) -> tuple[tuple[Asked, ...], bool]:
+def conflict_of(work: Work) -> tuple[tuple[FamilyLimit, ...], bool]:
     """Limits that no payload keeps together, none of which can be left out; whether that is so."""
     every = asked_of(work)
     active = list(every)
@@ -99,13 +100,13 @@ def conflict_of(work: Work) -> tuple[tuple[Asked, ...], bool]:
     return tuple(active), True
 
 
-def conflict(work: Work, found: tuple[tuple[Asked, ...], bool]) -> Conflict:
+def conflict(work: Work, found: tuple[tuple[FamilyLimit, ...], bool]) -> Conflict:
     """The same by id, mission and line."""
     cases = {mission.name: mission.case for mission in work.missions}
     return Conflict(tuple(_member(work.case, cases, one) for one in found[0]), found[1])
 
 
-def _member(spec: Case, cases: dict[str, Case], one: Asked) -> ConflictMember:
+def _member(spec: Case, cases: dict[str, Case], one: FamilyLimit) -> ConflictMember:
     case = spec if one.mission is None else cases[one.mission]
     line = None
     for index, requirement in enumerate(case.spec.requirements):
@@ -134,7 +135,7 @@ def limit_fixes(work: Work, build: Callable[[], Build], seed: int) -> Iterator[F
     yield from by_size(found)
 
 
-def least_of(work: Work, one: Asked) -> Fraction | None:
+def least_of(work: Work, one: FamilyLimit) -> Fraction | None:
     """The least limit at which some payload meets all; None: at none, or not to be proven."""
     try:
         if one.part.kind == "sync":
@@ -148,7 +149,7 @@ def least_of(work: Work, one: Asked) -> Fraction | None:
         return None
 
 
-def _least_amount(work: Work, one: Asked) -> Fraction | None:
+def _least_amount(work: Work, one: FamilyLimit) -> Fraction | None:
     name = next(own for own in RESOURCES if own == one.part.kind)
     free = lifted(work, [one])
     problems = [replace(problem, objective=name) for problem in free.family.problems]
@@ -156,7 +157,7 @@ def _least_amount(work: Work, one: Asked) -> Fraction | None:
     return None if found is None or found.found is None else found.found.sums.amount(name)
 
 
-def _least_error(work: Work, one: Asked) -> Fraction | None:
+def _least_error(work: Work, one: FamilyLimit) -> Fraction | None:
     """By halving; what is found reaches less than it was asked for, and ends the search where
     nothing reaches less than it."""
     fails = min(_limit(own.problem, "accuracy") for own in _scenarios(work, one))
@@ -178,18 +179,18 @@ def _least_error(work: Work, one: Asked) -> Fraction | None:
     return Fraction(works)
 
 
-def _scenarios(work: Work, one: Asked) -> list[Any]:
+def _scenarios(work: Work, one: FamilyLimit) -> list[Any]:
     return [own for own in work.scenarios if own.mission == one.mission]
 
 
-def _reached(work: Work, one: Asked, found: Chosen) -> float:
+def _reached(work: Work, one: FamilyLimit, found: Chosen) -> float:
     """The largest error of one mission with a payload [m]."""
     assert found.found is not None
     missions = found.found.sums.missions
     return max(missions[place].error_m for place in work.of(one.mission or ALL))
 
 
-def _least_sync(work: Work, one: Asked) -> Fraction | None:
+def _least_sync(work: Work, one: FamilyLimit) -> Fraction | None:
     def holds(limit: float) -> bool:
         return _first(moved(work, {one: limit})) is not None
 
@@ -208,7 +209,7 @@ def _least_sync(work: Work, one: Asked) -> Fraction | None:
 
 
 def _proven(
-    work: Work, one: Asked, value: Fraction, build: Callable[[], Build], seed: int
+    work: Work, one: FamilyLimit, value: Fraction, build: Callable[[], Build], seed: int
 ) -> list[Fix]:
     """The change as it would be written, if the family so written has a payload."""
     told: dict[Fix, list[str]] = {}

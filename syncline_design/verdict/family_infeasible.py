@@ -7,12 +7,13 @@ from dataclasses import replace
 
 from syncline_design.choice.explain import listed, told
 from syncline_design.choice.outcome import Explanation, Fix
+from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Mission
-from syncline_design.verdict.family import ALL, Build, Work, choose_family, work_of
+from syncline_design.verdict.family import ALL, Work, choose_family, work_of
 from syncline_design.verdict.family_choice import cannot_share
 from syncline_design.verdict.family_fixes import (
-    Asked,
+    FamilyLimit,
     conflict,
     conflict_of,
     limit_fixes,
@@ -100,7 +101,7 @@ def _alone(mission: str, fix: Fix) -> Fix:
 def _explained(work: Work, settings: CheckSettings, build: Callable[[], Build]) -> Explanation:
     """Which missions and limits cannot go together, and which changes help, as far as time goes."""
     pieces = Pieces()
-    nothing: tuple[tuple[Asked, ...], bool] = ((), False)
+    nothing: tuple[tuple[FamilyLimit, ...], bool] = ((), False)
     names: tuple[str, ...] = ()
     if work.case.missions:
         names = pieces.made("missions that cannot share", lambda: cannot_share(work, build), ())

@@ -20,10 +20,16 @@ from syncline_design.choice.outcome import NoVerdict, OutOfTime
 from syncline_design.choice.slack import payload
 from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.tolerance import Measurement, ends_tried, measurement, weight
-from syncline_design.choice.variations import SheetFigure, quantity, sigma_figures, with_figure
+from syncline_design.choice.variations import (
+    Build,
+    SheetFigure,
+    quantity,
+    sigma_figures,
+    with_figure,
+)
 from syncline_design.choice.what_if import numbers_of, with_sensor_error, with_sheet_figure
 from syncline_design.machine.deadline import in_force
-from syncline_design.verdict.family import Build, Chosen, Work, with_problems
+from syncline_design.verdict.family import Chosen, Work, with_problems
 
 
 def measure_next(work: Work, chosen: Chosen, build: Callable[[], Build]) -> tuple[Measurement, ...]:

@@ -13,9 +13,9 @@ from syncline_design.verdict.choice_data import MOST_EXCLUDED, left_out, ruled_o
 from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.family import Chosen, Work
 from syncline_design.verdict.named import Exclusion, FrontDesign, RankedDesign, StampingRange
-from syncline_design.verdict.recheck_sums import BUDGETS, Budget
+from syncline_design.verdict.recheck_sums import BUDGETS, SummedKind
 
-Sums = dict[Budget, Fraction | None]
+Sums = dict[SummedKind, Fraction | None]
 
 
 def ranked(work: Work, chosen: Chosen, ways: StampingRange | None = None) -> RankedDesign:

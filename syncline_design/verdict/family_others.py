@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from syncline_design.choice.family import Family, FamilyDesign, broken_by_family, evaluate_family
-from syncline_design.choice.family_best import FamilyPoint, Found, iter_differing
+from syncline_design.choice.family_best import FamilyPoint, SummedDesign, iter_differing
 from syncline_design.choice.family_parts import same_sensors, sensor_groups, without_sensor
 from syncline_design.choice.family_roads import all_of_family, front_by_road
 from syncline_design.choice.problem import selection_of
@@ -42,15 +42,15 @@ def next_best(
             return
 
 
-def _chosen(work: Work, one: Found) -> Chosen:
+def _chosen(work: Work, one: SummedDesign) -> Chosen:
     return Chosen(work.family.designs(one.design), work.family.problems, one)
 
 
-def _every(work: Work) -> Iterator[Found]:
+def _every(work: Work) -> Iterator[SummedDesign]:
     return accepted(work)
 
 
-def _differing(work: Work) -> Iterator[Found]:
+def _differing(work: Work) -> Iterator[SummedDesign]:
     groups = [sensor_groups(work.family, r) for r in range(len(work.family.roles))]
     return iter_differing(work.family, groups, passing(work))
 

@@ -33,11 +33,16 @@ from syncline_design.choice.slack import (
     with_change,
 )
 from syncline_design.choice.table import Design, Problem
-from syncline_design.choice.variations import PLATFORM_FIGURES, PlatformFigure, platform_figure
+from syncline_design.choice.variations import (
+    PLATFORM_FIGURES,
+    Build,
+    PlatformFigure,
+    platform_figure,
+)
 from syncline_design.choice.what_if import same_design, with_method_tau, with_sensor_error
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.verdict.family import Build, Chosen, Work, with_problems
+from syncline_design.verdict.family import Chosen, Work, with_problems
 
 # Values at which a payload is chosen anew, over the term's own.
 FEW_GROWTHS = (1.0 + 1e-9, 1.01, 1.1, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0, 1e3, 1e4, 1e6)

@@ -14,18 +14,18 @@ from syncline_design.choice.missed import shown_figures
 from syncline_design.choice.narrowed import narrowed
 from syncline_design.choice.outcome import NoVerdict, OutOfTime
 from syncline_design.choice.table import Problem
+from syncline_design.choice.variations import Build
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Mission
 from syncline_design.verdict.admitted import Kinds, admissions, with_whole_catalog
 from syncline_design.verdict.family import (
-    Build,
     Chosen,
     Work,
     choose_family,
     with_problems,
     work_of,
 )
-from syncline_design.verdict.family_fixes import Asked, asked_of, least_of
+from syncline_design.verdict.family_fixes import FamilyLimit, asked_of, least_of
 from syncline_design.verdict.family_named import ranked
 from syncline_design.verdict.why_not import (
     Answer,
@@ -158,7 +158,7 @@ def _places(chosen: Chosen, kind: EntryKind, entry: str) -> list[str]:
 
 def _kept_out(parts: Sequence[Work], kind: EntryKind, entry: str) -> NotTaken:
     """Of an entry that could be chosen: the limit that every payload with it misses by least."""
-    found: list[tuple[Fraction, Asked, Fraction, Fraction, Work]] = []
+    found: list[tuple[Fraction, FamilyLimit, Fraction, Fraction, Work]] = []
     for part in parts:
         for one in asked_of(part):
             limit = _limit(part, one)
@@ -177,7 +177,7 @@ def _kept_out(parts: Sequence[Work], kind: EntryKind, entry: str) -> NotTaken:
     return NotTaken(entry, kind, one.part.kind, float(value), float(limit), reason)
 
 
-def _limit(work: Work, one: Asked) -> Fraction | None:
+def _limit(work: Work, one: FamilyLimit) -> Fraction | None:
     """The tightest that is asked."""
     name = "accuracy_m" if one.part.kind == "accuracy" else one.part.kind
     own = (s for s in work.scenarios if one.mission in (None, s.mission))

@@ -29,8 +29,8 @@ from syncline_design.simulation.intervals import proportion_interval
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SensorEntry
 
-Figure = tuple[str, str, int | None]  # sensor, figure, axis
-Spans = dict[Figure, tuple[float, float]]
+FigureName = tuple[str, str, int | None]  # sensor, figure, axis
+Spans = dict[FigureName, tuple[float, float]]
 
 FIRST = 20_000  # samples, doubled until the interval leaves the probability asked for
 MOST = 1_280_000
@@ -38,7 +38,7 @@ CONFIDENCE = 0.999
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate(Record):
+class Probability(Record):
     """A probability with its interval, and whether it reaches what is asked for."""
 
     value: float
@@ -56,9 +56,9 @@ class Likelihood:
     spans: tuple[Spans, ...]
     asked: float
     seed: int
-    known: dict[tuple[object, ...], Estimate] = field(default_factory=dict)
+    known: dict[tuple[object, ...], Probability] = field(default_factory=dict)
 
-    def of(self, problems: Sequence[Problem], designs: Sequence[Design]) -> Estimate:
+    def of(self, problems: Sequence[Problem], designs: Sequence[Design]) -> Probability:
         """The probability of one design of every mission, which holds at given figures."""
         chosen = [chosen_options(p, d) for p, d in zip(problems, designs, strict=True)]
         clocks = tuple(design.clocks for design in designs)
@@ -69,11 +69,11 @@ class Likelihood:
 
     def _estimated(
         self, problems: Sequence[Problem], designs: Sequence[Design], chosen: list[list[Option]]
-    ) -> Estimate:
+    ) -> Probability:
         """More samples until the interval leaves the probability that is asked for."""
         varying = {sensor for spans in self.spans for sensor, *_ in spans}
         if not any(option.sensor in varying for own in chosen for option in own):
-            return Estimate(1.0, 1.0, 1.0, 0, "pass")  # as at given figures, which it keeps
+            return Probability(1.0, 1.0, 1.0, 0, "pass")  # as at given figures, which it keeps
         kept = count = 0
         while True:
             in_force().check()
@@ -92,9 +92,9 @@ class Likelihood:
             if low >= self.asked or high < self.asked:
                 status = "pass" if low >= self.asked else "fail"
             if status != "indeterminate" or count >= MOST:
-                return Estimate(kept / count, low, high, count, status)
+                return Probability(kept / count, low, high, count, status)
 
-    def _drawn(self, first: int, blocks: int) -> dict[Figure, Floats]:
+    def _drawn(self, first: int, blocks: int) -> dict[FigureName, Floats]:
         """Places in the intervals: of each block and each figure a stream of its own.
 
         A figure is the same one in every mission, whatever its interval there.
@@ -127,7 +127,7 @@ def _holds(
     problem: Problem,
     design: Design,
     options: list[Option],
-    drawn: dict[Figure, Floats],
+    drawn: dict[FigureName, Floats],
     size: int,
 ) -> Bools:
     """Where one mission keeps its requirements."""
@@ -153,7 +153,7 @@ def _holds(
 
 
 def _sampled(
-    case: Case, table: RoleTable, option: Option, drawn: dict[Figure, Floats]
+    case: Case, table: RoleTable, option: Option, drawn: dict[FigureName, Floats]
 ) -> Floats | None:
     """A sensor's error [m] for each sample; None where none of its figures has an interval."""
     stage = case.stages[table.stage]
@@ -174,7 +174,7 @@ def _sampled(
 
 
 def _norm(
-    entry: SensorEntry, sensor: str, figure: str, axes: int, drawn: dict[Figure, Floats]
+    entry: SensorEntry, sensor: str, figure: str, axes: int, drawn: dict[FigureName, Floats]
 ) -> Floats | float:
     """Euclidean norm of a figure over its axes; one figure holds for each of them."""
     value = getattr(entry, figure)

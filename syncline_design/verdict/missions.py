@@ -14,6 +14,7 @@ from syncline_design.choice.outcome import (
 )
 from syncline_design.choice.problem import selection_of, with_everything
 from syncline_design.choice.table import Design, Problem
+from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Pieces, in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import percent, to_digits
@@ -22,7 +23,6 @@ from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import Selection
 from syncline_design.verdict.cautions import unproven
 from syncline_design.verdict.family import (
-    Build,
     Chosen,
     Work,
     choose_family,
@@ -62,7 +62,7 @@ _STATUS_ORDER = {"fail": 0, "indeterminate": 1, "pass": 2}
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class JudgedMission:
     """One mission with the family's design: its verdict, and its rows at their worst corner."""
 
     mission: Mission
@@ -78,7 +78,7 @@ class Judged:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FamilyOutcome:
     """A family's verdict; work and chosen: where it came to a choice."""
 
     verdict: Verdict
@@ -91,7 +91,7 @@ def check_family(case: Case, settings: CheckSettings) -> Verdict:
     return judged_family(case, settings).verdict
 
 
-def judged_family(case: Case, settings: CheckSettings) -> Found:
+def judged_family(case: Case, settings: CheckSettings) -> FamilyOutcome:
     """The verdict, with the choice that it is on."""
 
     def build() -> Build:
@@ -107,14 +107,14 @@ def judged_family(case: Case, settings: CheckSettings) -> Found:
             if found.verdict != "fails" or not any(
                 names_candidates(one.case) for one in work.missions
             ):
-                return Found(found, work, pinned)
+                return FamilyOutcome(found, work, pinned)
         chosen = choose_family(work, settings.method) if pinned is None else None
         if chosen is None:
-            return Found(infeasible_family(work, settings, build), work)
+            return FamilyOutcome(infeasible_family(work, settings, build), work)
         choice = ChoiceResult(proof=chosen.proof)
-        return Found(_verdict_on(work, chosen, settings, build, choice), work, chosen)
+        return FamilyOutcome(_verdict_on(work, chosen, settings, build, choice), work, chosen)
     except OutOfTime as error:
-        return Found(unfinished_verdict(case, None, settings, str(error)), work)
+        return FamilyOutcome(unfinished_verdict(case, None, settings, str(error)), work)
 
 
 def _verdict_on(
@@ -205,7 +205,7 @@ def _judged(
     selections: Sequence[Selection],
     sums: Sums,
     settings: CheckSettings,
-) -> Judged:
+) -> JudgedMission:
     """A mission's verdict at its figures as given; its rows at whichever end is worst."""
     places = work.of(mission.name)
     selection = selections[places[0]]
@@ -226,7 +226,7 @@ def _judged(
     rows.append(verified.requirements)
     worst = _worst_rows(rows)
     rows_here = _in_place(work.case, mission.case, _with_sums(mission.case, worst, sums))
-    return Judged(mission, selection, verdict, rows_here)
+    return JudgedMission(mission, selection, verdict, rows_here)
 
 
 def _in_place(
@@ -318,7 +318,9 @@ def _least_margin(rows: Sequence[RequirementResult]) -> float:
     return min(shares, default=math.inf)
 
 
-def _alone(one: Judged, build: Callable[[], Build], seed: int) -> Callable[[], RankedDesign | None]:
+def _alone(
+    one: JudgedMission, build: Callable[[], Build], seed: int
+) -> Callable[[], RankedDesign | None]:
     """The best payload of a mission by itself."""
 
     def choose() -> RankedDesign | None:
@@ -331,8 +333,8 @@ def _alone(one: Judged, build: Callable[[], Build], seed: int) -> Callable[[], R
 
 def _assembled(
     work: Work,
-    judged: Sequence[Judged],
-    shown: Judged,
+    judged: Sequence[JudgedMission],
+    shown: JudgedMission,
     sums: Sums,
     settings: CheckSettings,
     choice: ChoiceResult,
@@ -371,7 +373,7 @@ def _open_roles(work: Work) -> tuple[str, ...]:
     )
 
 
-def _family_rows(judged: Sequence[Judged]) -> tuple[RequirementResult, ...]:
+def _family_rows(judged: Sequence[JudgedMission]) -> tuple[RequirementResult, ...]:
     """Of each requirement the row of the mission that is nearest to its limit, or beyond it."""
     worst: dict[str, tuple[RequirementResult, str]] = {}
     for one in judged:
@@ -393,7 +395,7 @@ def _order_of(row: RequirementResult) -> tuple[int, float]:
     return _STATUS_ORDER[row.status], share
 
 
-def _differing_roles(judged: Sequence[Judged]) -> Iterator[Caution]:
+def _differing_roles(judged: Sequence[JudgedMission]) -> Iterator[Caution]:
     """Roles in which missions have sensors, or ways of stamping them, of their own."""
     for picked in judged[0].selection.roles:
         own: dict[tuple[str, str, str], list[str]] = {}
@@ -411,7 +413,7 @@ def _differing_roles(judged: Sequence[Judged]) -> Iterator[Caution]:
             yield Caution("differs-by-mission", message)
 
 
-def _mission_verdict(one: Judged) -> MissionVerdict:
+def _mission_verdict(one: JudgedMission) -> MissionVerdict:
     return MissionVerdict(
         name=one.mission.name,
         verdict=one.word,
@@ -424,7 +426,9 @@ def _mission_verdict(one: Judged) -> MissionVerdict:
     )
 
 
-def _warnings(judged: Sequence[Judged], shown: Judged, *, several: bool) -> Iterator[Caution]:
+def _warnings(
+    judged: Sequence[JudgedMission], shown: JudgedMission, *, several: bool
+) -> Iterator[Caution]:
     """What any mission is cautioned of, once; which mission the page's figures are of."""
     if several:
         name = shown.mission.name

@@ -9,7 +9,7 @@ from syncline_design.choice.outcome import PriceStep, Proof
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 
-Figure = float | str | None
+FactFigure = float | str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +123,8 @@ class Exclusion(Record):
     method: str | None
     reason: str
     code: str = ""
-    figure: Figure = None
-    limit: Figure = None
+    figure: FactFigure = None
+    limit: FactFigure = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,7 +20,7 @@ from syncline_design.choice.tolerance import (
 )
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case
 from syncline_design.verdict.figure_front import (
@@ -83,7 +83,7 @@ class Optimisation(Record):
     entries that were asked about; alternatives, bargains: as in a verdict.
     """
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     verdict: Word
     spec: SpecName
     proof: Proof

@@ -60,7 +60,7 @@ from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Word
 from syncline_design.verdict.verified import Verified, error_figures
 from syncline_design.verdict.verify import open_verdict
-from syncline_design.verdict.why_not import Asked, questions_of, why_not
+from syncline_design.verdict.why_not import AskedSpec, questions_of, why_not
 
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
@@ -101,7 +101,7 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
             result = _with_hinges(result, (case, problem, designs[0], build), pieces)
             result = _with_others(result, case, problem, designs[0], settings, points, pieces)
     if settings.why_not:
-        asked = Asked(case, problem, designs[0] if designs else None, build, questions[0])
+        asked = AskedSpec(case, problem, designs[0] if designs else None, build, questions[0])
         answers = tuple(pieces.listed("why not", lambda: why_not(asked, questions[1])))
         result = replace(result, why_not=answers)
     result = replace(

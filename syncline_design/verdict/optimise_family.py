@@ -12,6 +12,7 @@ from syncline_design.choice.outcome import PriceStep, Proof
 from syncline_design.choice.problem import selection_of
 from syncline_design.choice.slack import Slack
 from syncline_design.choice.tolerance import MissionDesign, tolerance_over
+from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Pieces
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case
@@ -19,7 +20,7 @@ from syncline_design.spec.edit import pinned_spec_text
 from syncline_design.spec.edit_missions import pinned_missions_text
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.acceptance import Simulations
-from syncline_design.verdict.family import MERGED, Build, Chosen, Work, choose_family, front_of
+from syncline_design.verdict.family import MERGED, Chosen, Work, choose_family, front_of
 from syncline_design.verdict.family_choice import as_far
 from syncline_design.verdict.family_figure_front import family_figure_front
 from syncline_design.verdict.family_measure import measure_next
@@ -34,7 +35,7 @@ from syncline_design.verdict.family_others import next_best, with_stampings
 from syncline_design.verdict.family_slack import family_slack
 from syncline_design.verdict.family_why_not import Question, why_not_in_family
 from syncline_design.verdict.figure_front import drawn_requirement, figure_words
-from syncline_design.verdict.missions import Found as Judged
+from syncline_design.verdict.missions import FamilyOutcome as Judged
 from syncline_design.verdict.missions import judged_family
 from syncline_design.verdict.named import FrontDesign, RankedDesign
 from syncline_design.verdict.optimisation import (

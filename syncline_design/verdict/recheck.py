@@ -28,7 +28,13 @@ from syncline_design.spec.catalog import SensorEntry
 from syncline_design.spec.selection import RoleSelection, Selection
 from syncline_design.verdict.recheck_facts import impossible, sample_spacing, underway
 from syncline_design.verdict.recheck_noise import bends, sigma_at
-from syncline_design.verdict.recheck_sums import BUDGETS, Bought, money, owned_pieces, sum_of
+from syncline_design.verdict.recheck_sums import (
+    BUDGETS,
+    RecheckedPieces,
+    money,
+    owned_pieces,
+    sum_of,
+)
 
 DIGITS = 60
 IMPLIED_SYNC = "SYNC"
@@ -91,7 +97,7 @@ class _Chosen:
     """One role's entries: the sensor, its timestamp error, timeline and hardware."""
 
     sensor: Any
-    bought: Bought
+    bought: RecheckedPieces
     error: Any
     method: Any  # None for an error given in place
     timeline: str  # "utc" or the vehicle whose host clock it is
@@ -234,7 +240,7 @@ def _chosen(
     host = stage.choice.vehicle or name
     given = role.choice.sensor  # an id, or the entry itself
     listed = given if isinstance(given, SensorEntry) else case.catalog.sensors[picked.sensor]
-    bought = Bought(picked.sensor, listed)
+    bought = RecheckedPieces(picked.sensor, listed)
     return _Chosen(
         sensor, bought, error, method, "utc" if timeline == "utc" else f"host {host}", tau,
         stage.choice.look,
@@ -380,26 +386,26 @@ def _clock(case: Case, selection: Selection, vehicle: str) -> Any:
 
 def _bought(
     case: Case, selection: Selection, chosen: Mapping[tuple[str, RoleName], _Chosen]
-) -> Iterator[Bought]:
+) -> Iterator[RecheckedPieces]:
     """What a design buys: shared hardware once per vehicle and full set of channels."""
     channels: dict[tuple[str, str], int] = {}
     vehicles = {stage.name: stage.vehicle or stage.name for stage in case.spec.stages}
     for (stage, _), one in chosen.items():
         yield one.bought
         if one.method is not None:
-            yield Bought(None, one.method)
+            yield RecheckedPieces(None, one.method)
             for item, count in one.method.requires.items():
                 key = (vehicles[stage], item)
                 channels[key] = channels.get(key, 0) + count
     for vehicle in dict.fromkeys(vehicles.values()):
         clock, name = _clock(case, selection, vehicle), selection.clock(vehicle)
         if clock is not None and name is not None:
-            yield Bought(name, case.catalog.clocks[name])
+            yield RecheckedPieces(name, case.catalog.clocks[name])
             for item, count in clock.requires.items():
                 channels[vehicle, item] = channels.get((vehicle, item), 0) + count
     for (_, item), count in channels.items():
         entry = case.catalog.infrastructure[item]
-        yield Bought(item, entry, (count + entry.channels - 1) // entry.channels)
+        yield RecheckedPieces(item, entry, (count + entry.channels - 1) // entry.channels)
 
 
 def _requirements(

@@ -13,12 +13,12 @@ from typing import Any, Literal
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 
-Budget = Literal["cost", "mass", "power"]
-BUDGETS: tuple[Budget, ...] = ("cost", "mass", "power")
+SummedKind = Literal["cost", "mass", "power"]
+BUDGETS: tuple[SummedKind, ...] = ("cost", "mass", "power")
 
 
 @dataclass(frozen=True, slots=True)
-class Bought:
+class RecheckedPieces:
     """Pieces of an entry as its catalog has it; name: its id, None where it cannot be owned."""
 
     name: str | None
@@ -26,7 +26,7 @@ class Bought:
     pieces: int = 1
 
 
-def sum_of(case: Case, bought: Sequence[Bought], of: Budget) -> Fraction | None:
+def sum_of(case: Case, bought: Sequence[RecheckedPieces], of: SummedKind) -> Fraction | None:
     """The sum of a resource; None where one of the entries does not say."""
     total = Fraction(0)
     for one in bought:
@@ -37,7 +37,7 @@ def sum_of(case: Case, bought: Sequence[Bought], of: Budget) -> Fraction | None:
     return total
 
 
-def _each(case: Case, one: Bought, of: Budget) -> Fraction | None:
+def _each(case: Case, one: RecheckedPieces, of: SummedKind) -> Fraction | None:
     """What one piece takes."""
     if of == "cost" and one.name in case.spec.owned:
         return Fraction(0)
@@ -51,7 +51,7 @@ def _each(case: Case, one: Bought, of: Budget) -> Fraction | None:
     return Fraction(cents + (2 * rest >= exact.denominator), 100)
 
 
-def owned_pieces(case: Case, bought: Sequence[Bought]) -> tuple[tuple[str, int], ...]:
+def owned_pieces(case: Case, bought: Sequence[RecheckedPieces]) -> tuple[tuple[str, int], ...]:
     """Every owned entry that is in use, with how many pieces of it there have to be."""
     pieces: dict[str, int] = {}
     for one in bought:

@@ -7,7 +7,7 @@ from typing import Literal
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 
-Since = Literal["worse", "better", "same", "new", "gone"]
+SinceBaseline = Literal["worse", "better", "same", "new", "gone"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class RequirementSince(Record):
     """What became of a requirement; was: None of a new one."""
 
     id: str
-    change: Since
+    change: SinceBaseline
     was: Earlier | None
 
 

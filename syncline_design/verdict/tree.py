@@ -13,12 +13,12 @@ from typing import Annotated, Any, Final, Literal
 from syncline_design.choice.outcome import Explanation
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Named, Record, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
-from syncline_design.verdict.likely import Estimate
+from syncline_design.verdict.likely import Probability
 from syncline_design.verdict.named import (
     BillLine,
     ChoiceResult,
@@ -379,14 +379,14 @@ class Robustness(Record):
     nominal: RankedDesign | None
     price: float | None
     unit: str
-    probability: Estimate | None = optional()
+    probability: Probability | None = optional()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict(Record):
     """What `check` says of one spec; without a design its figures are None."""
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     verdict: Word
     spec: SpecFrame
     horizon: MissionHorizon
@@ -443,7 +443,7 @@ class FileProblem(Record):
 class Refused(Record):
     """A file among several that could not be read; nothing of it was computed."""
 
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     verdict: Literal["refused"] = "refused"
     file: str
     problems: tuple[FileProblem, ...]
@@ -467,5 +467,5 @@ Checked = Verdict | Refused  # what there is to say of one file among several
 class Verdicts(Record):
     """What `check` says of several files."""
 
-    schema: Annotated[str, Named(SEVERAL_SCHEMA)]
+    schema: Annotated[str, SchemaName(SEVERAL_SCHEMA)]
     verdicts: tuple[Checked, ...]

@@ -20,7 +20,7 @@ from syncline_design.spec.case import Case
 from syncline_design.verdict.admitted import Kinds, admissions, homes, kinds_of, with_whole_catalog
 from syncline_design.verdict.choice_data import ruled_out_rows
 from syncline_design.verdict.design_data import full_design
-from syncline_design.verdict.named import Exclusion, Figure, NamedDesign
+from syncline_design.verdict.named import Exclusion, FactFigure, NamedDesign
 
 # Of several ways to use an entry in one place the one that comes nearest speaks for it: what only
 # its timestamps rule out, then what is not told, and so on; last what does not fit its signals.
@@ -42,8 +42,8 @@ class NotTaken(Record):
     entry: str
     kind: EntryKind
     code: str
-    figure: Figure
-    limit: Figure
+    figure: FactFigure
+    limit: FactFigure
     reason: str
     place: str | None = optional()
 
@@ -82,7 +82,7 @@ Answer = NotTaken | HeldBack
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedSpec:
     """The spec with its tables and best design.
 
     build: how a changed spec becomes tables; whole: the spec with every entry that is asked about.
@@ -103,14 +103,14 @@ def questions_of(case: Case, entries: Sequence[str]) -> tuple[Case, Kinds]:
     return whole, kinds_of(whole, entries)
 
 
-def why_not(asked: Asked, kinds: Kinds) -> Iterator[Answer]:
+def why_not(asked: AskedSpec, kinds: Kinds) -> Iterator[Answer]:
     """An answer for each entry, and for each kind of entry that its id names."""
     for entry, named in kinds.items():
         for kind in named:
             yield from _answers(asked, kind, entry)
 
 
-def _answers(asked: Asked, kind: EntryKind, entry: str) -> Iterator[Answer]:
+def _answers(asked: AskedSpec, kind: EntryKind, entry: str) -> Iterator[Answer]:
     held = _held(asked, asked, kind, entry, candidate=True)
     if held is not None:
         yield held
@@ -139,7 +139,7 @@ def unlisted_text(whole: Case, kind: EntryKind, entry: str) -> str:
     return f"{entry} is not among the candidates of {listed(where)}"
 
 
-def _if_it_were(asked: Asked, kind: EntryKind, entry: str) -> Iterator[Answer]:
+def _if_it_were(asked: AskedSpec, kind: EntryKind, entry: str) -> Iterator[Answer]:
     """The best answer over the places that it could have, were it a candidate there."""
     found: list[HeldBack] = []
     missed: list[NotTaken] = []
@@ -166,7 +166,7 @@ def _order(case: Case, one: HeldBack) -> tuple[bool, float, float]:
 
 
 def _held(
-    asked: Asked, there: Asked, kind: EntryKind, entry: str, *, candidate: bool
+    asked: AskedSpec, there: AskedSpec, kind: EntryKind, entry: str, *, candidate: bool
 ) -> HeldBack | None:
     """The best design that holds an entry, against the best of all."""
     chosen = asked.chosen if candidate else None  # else its places are those of other tables
@@ -190,7 +190,7 @@ def _held(
     return HeldBack(entry, kind, with_it, dearer, worse, taken, candidate)
 
 
-def _places(asked: Asked, design: Design, kind: EntryKind, entry: str) -> list[str]:
+def _places(asked: AskedSpec, design: Design, kind: EntryKind, entry: str) -> list[str]:
     """Roles and vehicles that hold an entry in a design."""
     problem, found = asked.problem, []
     for table, place in zip(problem.roles, design.options, strict=True):

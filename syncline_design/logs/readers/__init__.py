@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 
-from syncline_design.logs.readers.reader import Head, Reader, head_of
+from syncline_design.logs.readers.reader import FileHead, Reader, head_of
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
 
@@ -28,7 +28,7 @@ def registry() -> dict[str, Reader]:
     return found
 
 
-def reader_of(head: Head) -> Reader | None:
+def reader_of(head: FileHead) -> Reader | None:
     """The reader that is surest of a file; None where no reader knows it."""
     sure = {reader: reader.recognises(head) for reader in registry().values()}
     best = max(sure, key=lambda reader: sure[reader], default=None)

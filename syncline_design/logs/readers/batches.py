@@ -33,7 +33,7 @@ from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 
-Columns = Mapping[str, NDArray[Any]]
+BatchColumns = Mapping[str, NDArray[Any]]
 MOST_STREAMS = 2_000
 
 
@@ -45,11 +45,11 @@ class Batch:
     messages: int
     primary_ns: Nanoseconds | None
     secondary_ns: Nanoseconds | None
-    columns: Columns
+    columns: BatchColumns
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class StreamFacts:
     """What a reader knows of a stream besides its messages; as in `Stream` and `Stamps`."""
 
     quantity: tuple[str, ...] = ()
@@ -98,7 +98,7 @@ class BatchRecording(ABC):
         """Every batch; of one stream with its columns, or of all with stamps at least."""
 
     @abstractmethod
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         """What is known of a stream once all batches were seen."""
 
     def _cut(self, reason: str, messages: int) -> None:

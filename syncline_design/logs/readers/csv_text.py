@@ -18,12 +18,12 @@ from syncline_design.logs.cells import (
     numbers,
     trimmed,
 )
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts, scaled
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts, scaled
 from syncline_design.logs.readers.csv_names import Layout, TimeColumn, layout_of, time_columns
 from syncline_design.logs.readers.decimal_stamps import column as exact_stamps
 from syncline_design.logs.readers.decimal_stamps import power_of
 from syncline_design.logs.readers.epochs import WEEK_NS, WEEK_SECONDS, week_start_ns
-from syncline_design.logs.readers.reader import NO, Head, Reader
+from syncline_design.logs.readers.reader import NO, FileHead, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Timeline
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
@@ -195,13 +195,13 @@ class CsvRecording(BatchRecording):
             hint=bad.hint,
         )
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         layout: Layout = self._layout
         timeline, label, notes = self._timeline()
         skipped = [self._how.names[place] for place in sorted(self._text)]
         if skipped:
             notes = (*notes, f"not read, as they hold text: {', '.join(skipped)[:200]}")
-        return Facts(
+        return StreamFacts(
             quantity=layout.quantity,
             frame=layout.frame,
             timeline=timeline,
@@ -257,7 +257,7 @@ def _labels(cells: pl.Series) -> NDArray[np.float64]:
     return labels
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     """Text whose first line that is no comment, or last comment, holds names we know."""
     start = head.start
     text = start.removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace")

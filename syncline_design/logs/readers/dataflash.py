@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers.batches import (
     Batch,
+    BatchColumns,
     BatchRecording,
-    Columns,
-    Facts,
+    StreamFacts,
     Tally,
     scaled,
 )
 from syncline_design.logs.readers.dataflash_kinds import (
     LABELS,
-    Meaning,
+    KindMeaning,
     gps_clocks,
     meaning_of,
 )
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.quick_dataclass import dataclass
@@ -191,7 +191,7 @@ class DataFlashRecording(BatchRecording):
         columns = _columns(rows, kind, number, self._layouts) if whole else {}
         return Batch(name, rows.shape[0], _stamps(rows, kind), None, columns)
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         kind_name = name.partition("[")[0]
         kind = next(k for k in self._layouts.kinds.values() if k.name == kind_name)
         meaning = meaning_of(kind.name, kind.fields)
@@ -202,7 +202,7 @@ class DataFlashRecording(BatchRecording):
             notes.append("said twice with different layouts: the first one holds")
         number = next(n for n, k in self._layouts.kinds.items() if k is kind)
         none = None if kind.dtype is None else np.zeros(0, dtype=kind.dtype)
-        return Facts(
+        return StreamFacts(
             columns=() if none is None else tuple(_columns(none, kind, number, self._layouts)),
             quantity=meaning.quantity,
             frame=meaning.frame,
@@ -303,9 +303,9 @@ def _stamps(rows: NDArray[Any], kind: Kind) -> Nanoseconds | None:
     return stamps
 
 
-def _columns(rows: NDArray[Any], kind: Kind, number: int, layouts: Layouts) -> Columns:
+def _columns(rows: NDArray[Any], kind: Kind, number: int, layouts: Layouts) -> BatchColumns:
     """Figures of the fields, by the names of the contract where a field's meaning is known."""
-    meaning: Meaning = meaning_of(kind.name, kind.fields)
+    meaning: KindMeaning = meaning_of(kind.name, kind.fields)
     values: dict[str, NDArray[Any]] = {}
     labels: dict[str, str] = {}
     for name, char in zip(kind.fields, kind.layout, strict=True):
@@ -322,7 +322,7 @@ def _columns(rows: NDArray[Any], kind: Kind, number: int, layouts: Layouts) -> C
     return columns
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     return BY_MAGIC if head.start.startswith(HEAD + bytes([FMT])) else NO
 
 

@@ -36,7 +36,7 @@ ARRIVAL = "TimeUS is when the autopilot logged the fix; the receiver's own time 
 
 
 @dataclass(frozen=True, slots=True)
-class Meaning:
+class KindMeaning:
     """Quantities of a kind, its frame, which fields became columns, and how."""
 
     quantity: tuple[str, ...] = ()
@@ -90,11 +90,11 @@ NATURES: dict[str, Nature] = {
 NOT_THESE = frozenset({"NKF2", "NKF3", "NKF4", "NKF5", "NKF7", "NKF8", "NKF9"})
 
 
-def meaning_of(name: str, fields: tuple[str, ...]) -> Meaning:
+def meaning_of(name: str, fields: tuple[str, ...]) -> KindMeaning:
     """What a kind measures, told by its name and the fields that it has."""
     notes = KINDS.get(name.rstrip("0123456789"))
     if notes is None or name in NOT_THESE:
-        return Meaning()
+        return KindMeaning()
     here = set(fields)
     found = [(what, names) for what, names in QUANTITIES if set(names) <= here]
     renamed = {old: new for _, names in found for old, new in names.items()}
@@ -114,10 +114,10 @@ def meaning_of(name: str, fields: tuple[str, ...]) -> Meaning:
     if {"GWk", "GMS"} <= here:
         quantity.append("clock")
     if not quantity:
-        return Meaning()
+        return KindMeaning()
     frame: Frame = "wgs84" if PLACE.keys() <= here else "ned"
     shown = tuple(n for n in notes if "clock_gps_ns" not in n or "GMS" in here)
-    return Meaning(
+    return KindMeaning(
         tuple(dict.fromkeys(quantity)),
         frame if quantity != ["ranging"] else "unknown",
         bool({"attitude", "rate", "acceleration"} & set(quantity)),

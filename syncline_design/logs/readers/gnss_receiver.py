@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.readers import nmea, ubx
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
 from syncline_design.logs.readers.epochs import DAY_SECONDS, WEEK_SECONDS, gps_minus_utc_s
-from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Reader, library
+from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader, library
 from syncline_design.logs.readers.receiver_frames import UBX, FrameCount, frames
 from syncline_design.logs.readers.stream import UNSET, Recording
 from syncline_design.logs.refusals import refuse
@@ -235,12 +235,12 @@ class ReceiverRecording(BatchRecording):
         for k, name in enumerate(("latitude_deg", "longitude_deg", "height_m", "height_msl_m")):
             columns[name] = np.where(same, places[place, k], columns[name])
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         if name == FIX or name in self._kinds:
             return self._facts_of_nmea(name)
         return self._facts_of_ubx(name)
 
-    def _facts_of_nmea(self, name: str) -> Facts:
+    def _facts_of_nmea(self, name: str) -> StreamFacts:
         notes: tuple[str, ...] = ()
         of_times = tuple(self._jumps)
         dated = self._first_day is not None
@@ -264,7 +264,7 @@ class ReceiverRecording(BatchRecording):
             quantity, columns = ("attitude",), nmea.TURN_COLUMNS
             if kind in ("HDT", "THS"):
                 notes += ("its sentences carry no time",)
-        return Facts(
+        return StreamFacts(
             quantity=quantity,
             frame="wgs84" if name == FIX else "ned" if quantity else "unknown",
             timeline="utc" if dated else "unknown",
@@ -277,9 +277,9 @@ class ReceiverRecording(BatchRecording):
             columns=columns,
         )
 
-    def _facts_of_ubx(self, name: str) -> Facts:
+    def _facts_of_ubx(self, name: str) -> StreamFacts:
         if name in ("ESF-MEAS", "ESF-RAW"):
-            return Facts(timeline="boot", primary="timeTag", kind=name)
+            return StreamFacts(timeline="boot", primary="timeTag", kind=name)
         quantity = ubx.quantity_of(name)
         known = self._first_week is not None
         notes: tuple[str, ...] = ()
@@ -301,7 +301,7 @@ class ReceiverRecording(BatchRecording):
             quantity = ()
             notes += (f"what it measures is in {WHOLE} too, whose times are not rounded to 1 ms",)
         frame = "wgs84" if "position" in quantity else "ned" if quantity else "unknown"
-        return Facts(
+        return StreamFacts(
             quantity=quantity,
             frame=frame,  # type: ignore[arg-type]
             timeline="gps" if known else "unknown",
@@ -350,7 +350,7 @@ def _place_of_itow(name: str, path: Path) -> int | None:
 MOST_STRAY = 0.7  # of a head: bytes in no frame
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     """A sentence or message with a right checksum, and at its very beginning nothing binary.
 
     Packed bytes of any format hold eight that look like an empty message: what begins otherwise,

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.cells import NO_TIME, BadCellError, iso_times
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording
 from syncline_design.logs.readers.text_lines import head_lines, line_blocks
 from syncline_design.logs.refusals import refuse
@@ -105,14 +105,14 @@ class GpsdRecording(BatchRecording):
         stamps: Nanoseconds = np.where(found == NO_TIME, UNSET, found)
         return stamps
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         notes = []
         lacking = self._lacking.get(name, 0)
         if lacking and name in self._timed:
             notes.append(f"{lacking} reports have no time")
         if name == "TPV":
             notes.append("north and east are speed along track, down is minus climb")
-        return Facts(
+        return StreamFacts(
             quantity={"TPV": ("position", "velocity"), "ATT": ("attitude",)}.get(name, ()),
             frame={"TPV": "wgs84", "ATT": "ned"}.get(name, "unknown"),  # type: ignore[arg-type]
             timeline="utc",
@@ -156,7 +156,7 @@ def _number(report: Mapping[str, Any], name: str) -> float:
     return float(value) if known and abs(value) < 1e300 else NAN  # type: ignore[arg-type]
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     lines = head_lines(head.start, 2_000)
     return SURER if any(line.startswith(BEGINNING) for line in lines) else NO
 

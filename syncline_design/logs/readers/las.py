@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
 from syncline_design.logs.readers.epochs import (
     ADJUSTED_S,
     GPS_EPOCH_S,
@@ -28,7 +28,7 @@ from syncline_design.logs.readers.epochs import (
 )
 from syncline_design.logs.readers.las_header import MAGIC, TIMED, LasClaims, claims_of
 from syncline_design.logs.readers.laz_cut import mended, whole_points
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader, library
 from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
 from syncline_design.spec.load import BadInput
@@ -163,13 +163,13 @@ class LasRecording(BatchRecording):
         shifted: Nanoseconds = np.where(lost, UNSET, np.where(lost, 0, stamps) + SHIFT_NS)
         return shifted
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         claims = self._claims
         of_times = self._time_notes()
         notes = []
         if self._frame == "unknown":
             notes.append("the file does not say in which frame its points are")
-        return Facts(
+        return StreamFacts(
             quantity=("points",),
             frame=self._frame,
             timeline="gps" if self._adjusted else "unknown",
@@ -270,7 +270,7 @@ def _frame(header: Any) -> Frame:
     return "unknown"
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     return BY_MAGIC if head.start.startswith(MAGIC) and len(head.start) > 104 else NO
 
 

@@ -8,7 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader, library
 from syncline_design.logs.readers.ros_recording import (
     Container,
     DamagedError,
@@ -17,7 +17,7 @@ from syncline_design.logs.readers.ros_recording import (
     UnpackBudget,
     from_lz4,
 )
-from syncline_design.logs.readers.ros_types import Channel, Encoding, modern
+from syncline_design.logs.readers.ros_types import BagChannel, Encoding, modern
 
 MAGIC = b"\x89MCAP0\r\n"
 FORMAT = "MCAP file"
@@ -51,7 +51,7 @@ class McapFile(Container):
         self._records: Any = library("mcap.records", self.path, FORMAT)
         self._stream: Any = library("mcap.stream_reader", self.path, FORMAT)
         self._schemas: dict[int, tuple[str, str, str]] = {}
-        self._channels: dict[int, Channel] = {}
+        self._channels: dict[int, BagChannel] = {}
         budget = UnpackBudget(self.path, self._size)
         ended = False
         with self.path.open("rb") as file:
@@ -152,11 +152,11 @@ class McapFile(Container):
         elif isinstance(record, self._records.Channel):
             self._channels[record.id] = self._channel(record)
 
-    def _channel(self, record: Any) -> Channel:
+    def _channel(self, record: Any) -> BagChannel:
         name, encoding, text = self._schemas.get(record.schema_id, ("", "", ""))
         found = ENCODINGS.get((record.message_encoding, encoding), "other")
         kind = modern(name) if found != "other" else name
-        return Channel(record.topic, kind, found, text, record.message_encoding)
+        return BagChannel(record.topic, kind, found, text, record.message_encoding)
 
     def _unpacked(self, chunk: Any, budget: UnpackBudget) -> bytes:
         due = int(chunk.uncompressed_size)
@@ -194,7 +194,7 @@ def _from_zstd(data: bytes, due: int, path: Path) -> bytes:
     return plain
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     return BY_MAGIC if head.start.startswith(MAGIC) else NO
 
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.readers import lidar_packets
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts, Tally
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts, Tally
 from syncline_design.logs.readers.epochs import held as held_ns
 from syncline_design.logs.readers.lidar_packets import NovatelStream, Packet, packet_of
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader, library
 from syncline_design.logs.readers.stream import PointTimes, Recording, Timeline
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
@@ -226,20 +226,22 @@ class CaptureRecording(BatchRecording):
             if not file.short:
                 self._cut(f"the capture cannot be read on: {said}", count)
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         full = next(n for n in self._seen if self._named(n) == name)
         seen = self._seen[full]
         first = np.array(seen.first, dtype=np.int64)
         if not seen.own:
             timeline, notes = timeline_of(first, "utc")
             told = ("its packets say no time that is known here: stamps are those of the capture",)
-            return Facts(timeline=timeline, primary=CAPTURED, notes=(*told, *notes), kind=seen.kind)
+            return StreamFacts(
+                timeline=timeline, primary=CAPTURED, notes=(*told, *notes), kind=seen.kind
+            )
         timeline, notes = self._timeline(seen, first)
         points = None
         if seen.spans:
             points = PointTimes(0.0, float(np.median(seen.spans)) / 1e9, len(seen.spans))
         imu = seen.kind == "ouster_imu"
-        return Facts(
+        return StreamFacts(
             quantity=("rate", "acceleration", "clock") if imu else (),
             timeline=timeline,
             primary="acceleration time" if imu else "GPS time" if timeline == "gps" else "packet",
@@ -381,7 +383,7 @@ def _timestamp_mode(path: Path) -> str:
     return found[1].decode() if found else ""
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     return BY_MAGIC if head.start[:4] in MAGICS else NO
 
 

@@ -19,7 +19,7 @@ NO, BY_SHAPE, BY_MAGIC = 0, 1, 3  # 2 is for text with a header of its own
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class FileHead:
     """What is seen of a file before any reader: its first bytes, or the names in a folder."""
 
     path: Path
@@ -34,16 +34,16 @@ class Reader:
     """A format: its name for people, how sure it is that a file is of it, and how it is opened."""
 
     format: str
-    recognises: Callable[[Head], int]
+    recognises: Callable[[FileHead], int]
     open: Callable[[Path], Recording]
 
 
-def head_of(path: Path) -> Head:
+def head_of(path: Path) -> FileHead:
     """The beginning of a file; refuses what cannot be read at all."""
     try:
         if path.is_dir():
             names = tuple(sorted(one.name for one in path.iterdir()))
-            return Head(path, b"", 0, True, names)
+            return FileHead(path, b"", 0, True, names)
         if not path.is_file():
             what = "no regular file" if path.exists() else "nothing"
             raise refuse(
@@ -56,7 +56,7 @@ def head_of(path: Path) -> Head:
         raise refuse(path, f"cannot read the log: {error.strerror}") from None
     if not start:
         raise refuse(path, "the log is empty", line=1, column=1)
-    return Head(path, start, size)
+    return FileHead(path, start, size)
 
 
 def library(name: str, path: Path, format: str) -> Any:  # noqa: A002

@@ -33,7 +33,7 @@ class FrameCount:
     cut: int = 0  # bytes of a last frame that is not whole
 
 
-class Sums:
+class FletcherSums:
     """The 8-bit Fletcher sum of any piece of a block at once, by running sums.
 
     Of x_i .. x_(j-1): a = sum x_k, b = sum (j - k) x_k, both modulo 256.  A file of heads that
@@ -63,7 +63,7 @@ def frames(file: BinaryIO, count: FrameCount) -> Iterator[Frame]:
         ended = not more
         held += more
         at = 0
-        sums = Sums(held) if UBX in held else None
+        sums = FletcherSums(held) if UBX in held else None
         while at < len(held):
             found, after = _at(held, at, ended, count, sums)
             if after < 0:
@@ -77,7 +77,7 @@ def frames(file: BinaryIO, count: FrameCount) -> Iterator[Frame]:
 
 
 def _at(
-    held: bytes, at: int, ended: bool, count: FrameCount, sums: Sums | None
+    held: bytes, at: int, ended: bool, count: FrameCount, sums: FletcherSums | None
 ) -> tuple[Frame | None, int]:
     """A frame at a place, and the place behind it; negative where more bytes are wanted."""
     first = held[at]
@@ -136,7 +136,7 @@ def sentence(raw: bytes) -> bytes | None:
 
 
 def _ubx(
-    held: bytes, at: int, ended: bool, count: FrameCount, sums: Sums | None
+    held: bytes, at: int, ended: bool, count: FrameCount, sums: FletcherSums | None
 ) -> tuple[Frame | None, int]:
     if not held.startswith(UBX, at) and len(held) > at + 1:
         return None, _next(held, at, ended, count)

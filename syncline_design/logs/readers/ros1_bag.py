@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader
 from syncline_design.logs.readers.ros_recording import (
     Container,
     DamagedError,
@@ -21,7 +21,7 @@ from syncline_design.logs.readers.ros_recording import (
     UnpackBudget,
     from_lz4,
 )
-from syncline_design.logs.readers.ros_types import Channel, modern
+from syncline_design.logs.readers.ros_types import BagChannel, modern
 from syncline_design.logs.refusals import refuse
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -42,7 +42,7 @@ class Ros1Bag(Container):
         self._size = path.stat().st_size
 
     def _read(self) -> Iterator[RawMessage]:
-        self._channels: dict[int, Channel] = {}
+        self._channels: dict[int, BagChannel] = {}
         budget = UnpackBudget(self.path, self._size)
         with self.path.open("rb") as file:
             file.seek(len(MAGIC))
@@ -233,16 +233,16 @@ def _from_bz2(data: bytes, due: int) -> bytes:
         raise DamagedError("a chunk does not unpack") from None
 
 
-def _channel(fields: Fields, data: bytes) -> Channel:
+def _channel(fields: Fields, data: bytes) -> BagChannel:
     own, _ = _fields_of(_LENGTH.pack(len(data)) + data, 0)
     whole = {**own, b"topic": fields.get(b"topic", own.get(b"topic", b""))}
     text = {k: v.decode("utf-8", "replace") for k, v in whole.items()}
     by_name = {k.decode("ascii", "replace"): v for k, v in text.items()}
     kind = modern(by_name.get("type", ""))
-    return Channel(by_name["topic"], kind, "ros1", by_name.get("message_definition", ""))
+    return BagChannel(by_name["topic"], kind, "ros1", by_name.get("message_definition", ""))
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     return BY_MAGIC if head.start.startswith(MAGIC) else NO
 
 

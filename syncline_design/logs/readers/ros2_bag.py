@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from syncline_design.logs.readers.mcap_file import MAGIC as MCAP_MAGIC
 from syncline_design.logs.readers.mcap_file import McapFile
-from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Reader, library
+from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader, library
 from syncline_design.logs.readers.ros_recording import (
     Container,
     DamagedError,
@@ -19,7 +19,7 @@ from syncline_design.logs.readers.ros_recording import (
     RosRecording,
     UnpackBudget,
 )
-from syncline_design.logs.readers.ros_types import Channel, Encoding, modern
+from syncline_design.logs.readers.ros_types import BagChannel, Encoding, modern
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
 
@@ -146,7 +146,7 @@ def _checked() -> int:
     return int(in_force().is_over)
 
 
-def _channels(file: sqlite3.Connection, path: Path) -> tuple[dict[Any, Channel], bool]:
+def _channels(file: sqlite3.Connection, path: Path) -> tuple[dict[Any, BagChannel], bool]:
     kinds = dict(file.execute("SELECT name, type FROM sqlite_master"))
     if kinds.get("messages") != "table" or kinds.get("topics") != "table":
         expected = "tables topics and messages"
@@ -164,7 +164,7 @@ def _channels(file: sqlite3.Connection, path: Path) -> tuple[dict[Any, Channel],
     ):
         encoding: Encoding = "cdr" if written == "cdr" else "other"
         own = definitions.get(str(kind), "")
-        channels[number] = Channel(str(name), modern(str(kind)), encoding, own, str(written))
+        channels[number] = BagChannel(str(name), modern(str(kind)), encoding, own, str(written))
     return channels, _is_packed(path)
 
 
@@ -189,7 +189,7 @@ def _plain(data: bytes, budget: UnpackBudget, path: Path) -> bytes:
     return plain
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     if head.folder:
         bag = any(name.endswith((".db3", ".mcap", ".db3.zstd")) for name in head.names)
         return BY_MAGIC if METADATA in head.names else (BY_SHAPE if bag else NO)

@@ -37,7 +37,7 @@ MAP: Final = "east, north, up (REP 103); where its zero lies on Earth the log do
 
 
 @dataclass(frozen=True, slots=True)
-class Meaning:
+class TopicMeaning:
     """How the messages of one topic are read."""
 
     quantity: tuple[str, ...]
@@ -55,7 +55,7 @@ def has_meaning(topic: str, kind: str) -> bool:
     return _maker(topic, kind) is not None
 
 
-def meaning_of(topic: str, kind: str, first: Any) -> Meaning | None:
+def meaning_of(topic: str, kind: str, first: Any) -> TopicMeaning | None:
     """By type, with what the first message says of its frame; None for other types."""
     make = _maker(topic, kind)
     try:
@@ -76,7 +76,7 @@ def _vector(v: Any) -> Row:
     return v.x, v.y, v.z
 
 
-def _imu(first: Any) -> Meaning:
+def _imu(first: Any) -> TopicMeaning:
     known = first.orientation_covariance[0] != UNKNOWN_COVARIANCE
     known = known and math.isfinite(_turn(first.orientation)[0])
     turned = ("attitude",) if known else ()
@@ -87,10 +87,10 @@ def _imu(first: Any) -> Meaning:
 
     said = (XYZW, FLU, "orientation against east, north, up (REP 145)") if known else (FLU,)
     columns = (*(TURN if known else ()), *RATE, *PUSH)
-    return Meaning((*turned, "rate", "acceleration"), columns, row, "enu", "flu", said)
+    return TopicMeaning((*turned, "rate", "acceleration"), columns, row, "enu", "flu", said)
 
 
-def _odometry(first: Any) -> Meaning:
+def _odometry(first: Any) -> TopicMeaning:
     frame, said = _frame_of(first.header.frame_id, first.pose.pose.position)
     speeds = first.twist.twist
     moving = first.twist.covariance[0] != UNKNOWN_COVARIANCE
@@ -104,7 +104,7 @@ def _odometry(first: Any) -> Meaning:
     child = str(getattr(first, "child_frame_id", "")) or "the body"
     notes = (XYZW, FLU, f"twist is in {child[:60]}, the body", said)
     quantity = ("position", "attitude", *(("velocity", "rate") if moving or rates else ()))
-    return Meaning(quantity, (*PLACE, *TURN, *BODY_SPEED, *RATE), row, frame, "flu", notes)
+    return TopicMeaning(quantity, (*PLACE, *TURN, *BODY_SPEED, *RATE), row, frame, "flu", notes)
 
 
 def _frame_of(frame_id: str, place: Any) -> tuple[Frame, str]:
@@ -120,10 +120,10 @@ def _frame_of(frame_id: str, place: Any) -> tuple[Frame, str]:
     return "enu", f"{shown}: {MAP}"
 
 
-def _pose_like(pick: Callable[[Any], Any]) -> Callable[[Any], Meaning]:
+def _pose_like(pick: Callable[[Any], Any]) -> Callable[[Any], TopicMeaning]:
     """Pose(Stamped, WithCovarianceStamped): place and turn of the body in the header's frame."""
 
-    def make(first: Any) -> Meaning:
+    def make(first: Any) -> TopicMeaning:
         frame, said = _frame_of(first.header.frame_id, pick(first).position)
 
         def row(m: Any) -> Row:
@@ -131,34 +131,36 @@ def _pose_like(pick: Callable[[Any], Any]) -> Callable[[Any], Meaning]:
             return (*_vector(pose.position), *_turn(pose.orientation))
 
         notes = (XYZW, FLU, said)
-        return Meaning(("position", "attitude"), (*PLACE, *TURN), row, frame, "flu", notes)
+        return TopicMeaning(("position", "attitude"), (*PLACE, *TURN), row, frame, "flu", notes)
 
     return make
 
 
-def _transform(first: Any) -> Meaning:
+def _transform(first: Any) -> TopicMeaning:
     frame, said = _frame_of(first.header.frame_id, first.transform.translation)
 
     def row(m: Any) -> Row:
         return (*_vector(m.transform.translation), *_turn(m.transform.rotation))
 
-    return Meaning(("position", "attitude"), (*PLACE, *TURN), row, frame, "flu", (XYZW, FLU, said))
+    return TopicMeaning(
+        ("position", "attitude"), (*PLACE, *TURN), row, frame, "flu", (XYZW, FLU, said)
+    )
 
 
-def _point(first: Any) -> Meaning:
+def _point(first: Any) -> TopicMeaning:
     frame, said = _frame_of(first.header.frame_id, first.point)
-    return Meaning(("position",), PLACE, lambda m: _vector(m.point), frame, notes=(said,))
+    return TopicMeaning(("position",), PLACE, lambda m: _vector(m.point), frame, notes=(said,))
 
 
-def _quaternion(first: Any) -> Meaning:
+def _quaternion(first: Any) -> TopicMeaning:
     notes = (XYZW, FLU, MAP)
-    return Meaning(("attitude",), TURN, lambda m: _turn(m.quaternion), "enu", "flu", notes)
+    return TopicMeaning(("attitude",), TURN, lambda m: _turn(m.quaternion), "enu", "flu", notes)
 
 
-def _twist_like(pick: Callable[[Any], Any]) -> Callable[[Any], Meaning]:
+def _twist_like(pick: Callable[[Any], Any]) -> Callable[[Any], TopicMeaning]:
     """Twist(Stamped, WithCovarianceStamped): of the body where the frame is the body's own."""
 
-    def make(first: Any) -> Meaning:
+    def make(first: Any) -> TopicMeaning:
         name = str(first.header.frame_id).lower()
         own = any(word in name for word in ("base", "body", "imu", "link")) and "local" not in name
         where = "the body" if own else "east, north, up"
@@ -169,12 +171,12 @@ def _twist_like(pick: Callable[[Any], Any]) -> Callable[[Any], Meaning]:
             return (*_vector(twist.linear), *_vector(twist.angular))
 
         columns = (*(BODY_SPEED if own else SPEED), *RATE)
-        return Meaning(("velocity", "rate"), columns, row, "enu", "flu", (note, FLU))
+        return TopicMeaning(("velocity", "rate"), columns, row, "enu", "flu", (note, FLU))
 
     return make
 
 
-def _fix(first: Any) -> Meaning:
+def _fix(first: Any) -> TopicMeaning:
     """NavSatFix: altitude is above the ellipsoid by definition; no fix, no position."""
 
     def row(m: Any) -> Row:
@@ -186,10 +188,10 @@ def _fix(first: Any) -> Meaning:
         return (*place, *(spread if known else (NAN,) * 3), float(m.status.status))
 
     notes = ("heights are above the WGS 84 ellipsoid (sensor_msgs/NavSatFix)",)
-    return Meaning(("position",), (*GLOBE, *SPREAD, "fix_status"), row, "wgs84", notes=notes)
+    return TopicMeaning(("position",), (*GLOBE, *SPREAD, "fix_status"), row, "wgs84", notes=notes)
 
 
-def _gps_fix(first: Any) -> Meaning:
+def _gps_fix(first: Any) -> TopicMeaning:
     """GPSFix of gps_common: track is the course over ground, not the heading."""
 
     def row(m: Any) -> Row:
@@ -197,10 +199,10 @@ def _gps_fix(first: Any) -> Meaning:
 
     columns = (*GLOBE, "course_deg", "speed_mps", "climb_mps", "clock_gnss_s")
     notes = ("course_deg is that over ground, not the heading",)
-    return Meaning(("position", "clock"), columns, row, "wgs84", notes=notes)
+    return TopicMeaning(("position", "clock"), columns, row, "wgs84", notes=notes)
 
 
-def _inspva(first: Any) -> Meaning:
+def _inspva(first: Any) -> TopicMeaning:
     """INSPVA(X) of NovAtel: azimuth from north, clockwise; body right, forward, up there."""
     undulated = hasattr(first, "undulation")
 
@@ -218,17 +220,17 @@ def _inspva(first: Any) -> Meaning:
         "GPS week and second beside the stamp",
     )
     quantity = ("position", "attitude", "velocity", "clock")
-    return Meaning(quantity, columns, row, "wgs84", "frd", notes)
+    return TopicMeaning(quantity, columns, row, "wgs84", "frd", notes)
 
 
-def _bestpos(first: Any) -> Meaning:
+def _bestpos(first: Any) -> TopicMeaning:
     def row(m: Any) -> Row:
         place = (m.lat, m.lon, m.hgt + m.undulation)
         return (*place, m.lat_stdev, m.lon_stdev, m.hgt_stdev, *_gps_time(m))
 
     columns = (*GLOBE, "sigma_north_m", "sigma_east_m", "sigma_up_m", "gps_week", "gps_week_s")
     notes = ("height above sea level plus undulation (NovAtel)",)
-    return Meaning(("position", "clock"), columns, row, "wgs84", notes=notes)
+    return TopicMeaning(("position", "clock"), columns, row, "wgs84", notes=notes)
 
 
 def _gps_time(m: Any) -> Row:
@@ -236,16 +238,16 @@ def _gps_time(m: Any) -> Row:
     return float(header.gps_week_number), float(header.gps_week_milliseconds) * 1e-3
 
 
-def _cloud(first: Any) -> Meaning:
+def _cloud(first: Any) -> TopicMeaning:
     notes = ("points are not unpacked, but for their times",)
-    return Meaning(("points",), (), lambda m: (), "unknown", "unknown", notes, is_cloud=True)
+    return TopicMeaning(("points",), (), lambda m: (), "unknown", "unknown", notes, is_cloud=True)
 
 
-def _static(first: Any) -> Meaning:
+def _static(first: Any) -> TopicMeaning:
     """What stands still on the vehicle: lever arms, said one by one."""
     some = list(first.transforms)[:40]
     poses = tuple(_static_pose(one) for one in some)
-    return Meaning((), (), lambda m: (), notes=tuple(_arm(one) for one in some), static=poses)
+    return TopicMeaning((), (), lambda m: (), notes=tuple(_arm(one) for one in some), static=poses)
 
 
 def _static_pose(one: Any) -> StaticPose:
@@ -262,7 +264,7 @@ def _arm(one: Any) -> str:
     return f"lever arm of {child} in {parent} (forward, left, up): {place}"
 
 
-_MAKERS: Final[dict[str, Callable[[Any], Meaning]]] = {
+_MAKERS: Final[dict[str, Callable[[Any], TopicMeaning]]] = {
     "sensor_msgs/msg/Imu": _imu,
     "nav_msgs/msg/Odometry": _odometry,
     "geometry_msgs/msg/PoseStamped": _pose_like(lambda m: m.pose),
@@ -285,6 +287,6 @@ _MAKERS: Final[dict[str, Callable[[Any], Meaning]]] = {
 }
 
 
-def _maker(topic: str, kind: str) -> Callable[[Any], Meaning] | None:
+def _maker(topic: str, kind: str) -> Callable[[Any], TopicMeaning] | None:
     static = topic.rpartition("/")[2] == "tf_static" and kind.lower().endswith("tfmessage")
     return _static if static else _MAKERS.get(kind)

@@ -12,8 +12,8 @@ import numpy as np
 
 from syncline_design.logs.readers.point_times import CloudTimes, cloud_times
 from syncline_design.logs.readers.reader import library
-from syncline_design.logs.readers.ros_meaning import Meaning, has_meaning, meaning_of
-from syncline_design.logs.readers.ros_types import Channel, StampOf, stamp_of, unpacker
+from syncline_design.logs.readers.ros_meaning import TopicMeaning, has_meaning, meaning_of
+from syncline_design.logs.readers.ros_types import BagChannel, StampOf, stamp_of, unpacker
 from syncline_design.logs.readers.stream import (
     Incomplete,
     Nanoseconds,
@@ -53,7 +53,7 @@ def from_lz4(data: bytes, due: int, path: Path, format_: str) -> bytes:
 class RawMessage(NamedTuple):
     """A message as it stands in the file; publish_ns None where the format has no such time."""
 
-    channel: Channel
+    channel: BagChannel
     log_ns: int
     publish_ns: int | None
     data: bytes
@@ -121,10 +121,10 @@ class Container(ABC):
 class _Tally:
     """What is held of a topic while a bag is read."""
 
-    channel: Channel
+    channel: BagChannel
     own_name: str
     own_of: StampOf | None
-    meaning: Meaning | None
+    meaning: TopicMeaning | None
     unpack: Callable[[bytes], Any] | None
     logged: StampColumn = field(default_factory=StampColumn)
     own: StampColumn = field(default_factory=StampColumn)
@@ -140,7 +140,7 @@ class RosRecording:
     def __init__(self, container: Container) -> None:
         self._container = container
         self.path, self.format = container.path, container.format
-        self._channels: dict[str, Channel] = {}
+        self._channels: dict[str, BagChannel] = {}
 
     @property
     def incomplete(self) -> Incomplete | None:
@@ -324,5 +324,5 @@ def _recorder(timeline: Timeline, logged: Nanoseconds) -> list[str]:
     return [] if own == timeline else [f"stamps are {timeline}, the recorder's time is {own}"]
 
 
-def _unread(channel: Channel) -> str:
+def _unread(channel: BagChannel) -> str:
     return f"written as {channel.encoded or 'something else'}: only the recorder's times are read"

@@ -31,7 +31,7 @@ _SEQ_BYTES, _ENCAPSULATION_BYTES = 4, 4
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
+class BagChannel:
     """A topic of a bag: its type as `package/msg/Name`, how it is written, and its definition."""
 
     topic: str
@@ -49,7 +49,7 @@ def modern(kind: str) -> str:
     return "/".join(parts)
 
 
-def stamp_of(channel: Channel, path: Path) -> tuple[str, StampOf] | None:
+def stamp_of(channel: BagChannel, path: Path) -> tuple[str, StampOf] | None:
     """The name of the message's own stamp and how it is read; None where the type has none.
 
     Only a stamp at the very beginning counts, a header's or a time's: it is read without unpacking
@@ -87,7 +87,7 @@ def _reader(encoding: Encoding, at: int) -> StampOf:
     return of_ros1 if encoding == "ros1" else of_cdr
 
 
-def _first_field(channel: Channel, path: Path) -> tuple[str, str]:
+def _first_field(channel: BagChannel, path: Path) -> tuple[str, str]:
     if channel.definition:
         text = channel.definition[:LONGEST_DEFINITION]
         if "struct " in text and "module " in text:
@@ -133,7 +133,7 @@ def _standard_store(encoding: Encoding, typesys: Any) -> Any:
     return typesys.get_typestore(store)
 
 
-def unpacker(channel: Channel, path: Path) -> Callable[[bytes], Any] | None:
+def unpacker(channel: BagChannel, path: Path) -> Callable[[bytes], Any] | None:
     """A function from a message's bytes to the message; None where the type is not known.
 
     The bag's own definition goes before that of ROS: a type may have changed since.
@@ -148,7 +148,7 @@ def unpacker(channel: Channel, path: Path) -> Callable[[bytes], Any] | None:
     return lambda data: method(data, channel.kind)
 
 
-def _own_store(channel: Channel, typesys: Any) -> Any:
+def _own_store(channel: BagChannel, typesys: Any) -> Any:
     return _store_of(channel.kind, channel.encoding, channel.definition, typesys)
 
 

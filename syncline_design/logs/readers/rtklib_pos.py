@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
 from syncline_design.logs.readers.decimal_stamps import nanoseconds
 from syncline_design.logs.readers.epochs import DAY_NS, NANO, WEEK_NS, week_start_ns
-from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Reader
+from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import Frame, Recording, Timeline
 from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
 from syncline_design.logs.refusals import refuse
@@ -180,7 +180,7 @@ class PosRecording(BatchRecording):
             columns["velocity_down_mps"] = -up
         return columns
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         header = self._header
         notes = []
         timeline: Timeline = "utc" if header.system in ("UTC", "JST") else "gps"
@@ -198,7 +198,7 @@ class PosRecording(BatchRecording):
         if header.velocity:
             notes.append("velocity up was turned to down")
         frame: Frame = "enu" if header.place == "enu" else "wgs84"
-        return Facts(
+        return StreamFacts(
             quantity=("position", "velocity") if header.velocity else ("position",),
             frame=frame,
             timeline=timeline,
@@ -219,7 +219,7 @@ def _from_dms(fields: Sequence[str]) -> list[float]:
     return [*found, float(fields[6])]
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     lines = head_lines(head.start)
     if not lines:
         return NO

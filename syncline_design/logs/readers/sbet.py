@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
 from syncline_design.logs.readers.epochs import WEEK_S, WEEK_SECONDS, nanoseconds_of
-from syncline_design.logs.readers.reader import BY_SHAPE, NO, Head, Reader
+from syncline_design.logs.readers.reader import BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
 from syncline_design.model.figure_text import to_digits
@@ -102,7 +102,7 @@ class SbetRecording(BatchRecording):
                     self._cut(f"{left} bytes at the end are no whole record of {size}", rows)
                     return
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         of_times: tuple[str, ...] = (
             "seconds of the GPS week: neither the week nor whether they are GPS or UTC is in the "
             "file; give log: {gps_week, timeline}",
@@ -113,8 +113,8 @@ class SbetRecording(BatchRecording):
             of_times += (f"seconds of the week begin again {self._wraps} times",)
         if self._width == len(SMRMSG):
             notes: tuple[str, ...] = ("errors of a trajectory [rms], attitude in minutes of arc",)
-            return Facts(primary=WEEK_SECONDS, of_times=of_times, notes=notes, kind="smrmsg")
-        return Facts(
+            return StreamFacts(primary=WEEK_SECONDS, of_times=of_times, notes=notes, kind="smrmsg")
+        return StreamFacts(
             quantity=("position", "attitude", "velocity", "rate", "acceleration"),
             frame="wgs84",
             primary=WEEK_SECONDS,
@@ -158,7 +158,7 @@ def _errors(table: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
     }
 
 
-def _width(head: Head) -> int:
+def _width(head: FileHead) -> int:
     """Doubles of a record, 0 where the file is neither; told by the first records alone."""
     for names in (SBET, SMRMSG):
         width = len(names)
@@ -179,13 +179,13 @@ def _width(head: Head) -> int:
     return 0
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     return BY_SHAPE if not head.folder and _width(head) else NO
 
 
 def _open(path: Path) -> Recording:
     with path.open("rb") as file:
-        head = Head(path, file.read(1 << 16), path.stat().st_size)
+        head = FileHead(path, file.read(1 << 16), path.stat().st_size)
     width = _width(head)
     if not width:
         raise refuse(path, "no SBET", expected="records of 17 doubles with possible figures")

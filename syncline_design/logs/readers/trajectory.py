@@ -17,9 +17,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
+from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
 from syncline_design.logs.readers.decimal_stamps import nanoseconds
-from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Reader
+from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import UNSET, Recording, Timeline
 from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
 from syncline_design.logs.readers.timelines import timeline_of
@@ -279,7 +279,7 @@ class TrajectoryRecording(BatchRecording):
             columns |= {name: q[:, k] for k, name in enumerate(WXYZ)}
         return columns
 
-    def _facts(self, name: str) -> Facts:
+    def _facts(self, name: str) -> StreamFacts:
         columns = set(self._layout.columns) if self._layout.kind != "KITTI" else {*PLACE, *WXYZ}
         said = (
             ("position", PLACE),
@@ -300,7 +300,7 @@ class TrajectoryRecording(BatchRecording):
             of_times = (*of_times, "stamps were taken to count from 1970-01-01 UTC")
         if self._zeros:
             notes.append(f"{self._zeros} quaternions without length were left out")
-        return Facts(
+        return StreamFacts(
             quantity=tuple(what for what, names in said if set(names) <= columns),
             timeline=timeline,
             primary="timestamp",
@@ -310,7 +310,7 @@ class TrajectoryRecording(BatchRecording):
         )
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     lines = head_lines(head.start)
     found = layout_of(lines) if lines else None
     return NO if found is None else found[1]

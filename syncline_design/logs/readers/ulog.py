@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import (
     UNSET,
     Incomplete,
@@ -362,7 +362,7 @@ def _piece(topic: _Topic, meaning: Meaning | None, held: list[bytes], uses_sampl
     return Piece(sampled, published, columns)
 
 
-def _recognises(head: Head) -> int:
+def _recognises(head: FileHead) -> int:
     return BY_MAGIC if head.start.startswith(MAGIC) else NO
 
 
