@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.auditing.cadence import Cadence, about_rhythm
+from syncline_design.auditing.frames import Framed, framed
+from syncline_design.auditing.late_scatter import Waits, waits_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Mask, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import PointTimes
@@ -32,22 +35,105 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
     if series.receive is None or pace.places.size < 40:
         return None
     late = seconds((series.receive - series.stamp)[pace.places])
-    about = about_rhythm(seconds(series.stamp[pace.places] - series.stamp[pace.places[0]]))
+    when = _when(series, pace)
+    about = about_rhythm(when)
     if not late.any():
         if copied(about):
             return None
         return StampFault("stamped_on_arrival", {}, None, None,
                           "every stamp equals its receipt")  # fmt: skip
-    if about is None:
+    transport = _width(late)
+    return _scattered(about, transport) or _waited(when, transport) or _in_frames(when, transport)
+
+
+def _when(series: Series, pace: Cadence) -> Array:
+    """Stamps since the first [s]."""
+    return seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
+
+
+def _scattered(about: Array | None, transport_s: float) -> StampFault | None:
+    """By a scatter about the rhythm that is late rather than early."""
+    if about is None or not _one_sided(about):
         return None
-    own, transport = spread(about), _width(late)
-    if own < _LEAST_JITTER_S or transport > _TIGHT * own or not _one_sided(about):
+    own = spread(about)
+    if own < _LEAST_JITTER_S or transport_s > _TIGHT * own:
         return None
     return StampFault(
         "stamped_on_arrival", {"seconds": own}, None, None,
         f"stamps scatter by {in_words(own)} about the sensor's rhythm, late rather than early, "
-        f"while receipts follow within {in_words(transport)}: they say when messages came",
+        f"while receipts follow within {in_words(transport_s)}: they say when messages came",
     )  # fmt: skip
+
+
+def _waited(when: Array, transport_s: float) -> StampFault | None:
+    """By delays as long as the sensor's interval: none before its turn, many after."""
+    waits = waits_of(when)
+    if waits is None or not waits.late:
+        return None
+    own = spread(waits.about_s)
+    if own < _LEAST_JITTER_S or transport_s > _TIGHT * own:
+        return None
+    return StampFault(
+        "stamped_on_arrival", {"seconds": own}, None, None,
+        f"stamps come up to {in_words(waits.reach_s)} after the sensor's turn, never before it, "
+        f"and receipts follow within {in_words(transport_s)}: they say when messages came",
+    )  # fmt: skip
+
+
+def _in_frames(when: Array, transport_s: float) -> StampFault | None:
+    """By the frames of a bus on which they lie, now one more and now one less apart."""
+    found = framed(when)
+    if found is None or not found.varied or transport_s > _TIGHT * found.frame_s:
+        return None
+    frame = in_words(found.frame_s)
+    return StampFault(
+        "stamped_on_arrival", {"seconds": 0.5 * found.frame_s, "interval_s": found.frame_s}, None,
+        None,
+        f"stamps lie on a comb of {frame}, as the frames of USB are, by turns a frame more and "
+        f"less apart, {in_words(found.noise_s)} late on it, and receipts follow within "
+        f"{in_words(transport_s)}: they say when messages came",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Hidden:
+    """What stamps on arrival could hide in a stream that looks sound: by how much [s], and why."""
+
+    seconds: float
+    words: str
+
+
+def hidden_in(series: Series, pace: Cadence) -> Hidden | None:
+    """What stamps of a stream without faults of its own cannot tell from arrivals, if anything."""
+    if series.receive is None or pace.places.size < 40:
+        return None
+    when = _when(series, pace)
+    transport = _width(seconds((series.receive - series.stamp)[pace.places]))
+    found = framed(when)
+    if found is not None:
+        return _hidden_frame(found, transport)
+    waits = waits_of(when)
+    if waits is None or not waits.edged:
+        return None
+    own, reach = spread(waits.about_s), waits.reach_s
+    if own < _LEAST_JITTER_S or transport > _TIGHT * own:
+        return None
+    return Hidden(reach, f"whether it was stamped on arrival: its stamps scatter over "
+                  f"{in_words(reach)} from a sharp edge and receipts follow within "
+                  f"{in_words(transport)}, which waits for a host's turn do as well as a sensor "
+                  "that is triggered so")  # fmt: skip
+
+
+def _hidden_frame(found: Framed, transport_s: float) -> Hidden | None:
+    frame = in_words(found.frame_s)
+    if found.varied:
+        why = "by turns a frame more and less apart, as arrivals do and ticks of its own task"
+    elif transport_s < _TIGHT * found.frame_s:
+        why = "its interval is a whole number of them"
+    else:
+        return None
+    return Hidden(found.frame_s, f"whether it was stamped on arrival over USB: its stamps lie on "
+                  f"frames of {frame}, {in_words(found.noise_s)} late, {why}")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,13 +153,13 @@ def arrived_in_part(series: Series, pace: Cadence) -> ArrivedInPart | None:
     late = seconds((series.receive - series.stamp)[pace.places])
     stamp = series.stamp[pace.places]
     parts = np.array_split(np.arange(size), min(_MOST_PARTS, size // _PART))
-    told = [_scatters(stamp[part], late[part]) for part in parts]
-    own = np.asarray([np.inf if about is None else spread(about) for about, _ in told])
-    transport = np.asarray([width for _, width in told])
+    told = [_scatter_of(seconds(stamp[part] - stamp[part[0]])) for part in parts]
+    own = np.asarray([np.inf if one is None else spread(one.about_s) for one in told])
+    transport = np.asarray([_width(late[part]) for part in parts])
     arrived = (own > _LEAST_JITTER_S) & (transport < _TIGHT * own)  # or of no rhythm
     sure = arrived & np.isfinite(own)
-    scattered = [about for (about, _), k in zip(told, sure, strict=True) if about is not None and k]
-    if len(scattered) < 2 or arrived.all() or not _one_sided(np.concatenate(scattered)):
+    scattered = [one for one, k in zip(told, sure, strict=True) if k]
+    if len(scattered) < 2 or arrived.all() or not _late_in_most(scattered):
         return None
     usual = float(np.median(own[sure]))
     even = ~arrived & (own < _EVENER * usual) & (transport > float(np.max(transport[sure])))
@@ -97,9 +183,22 @@ def arrived_in_part(series: Series, pace: Cadence) -> ArrivedInPart | None:
     return ArrivedInPart(fault, inside)
 
 
-def _scatters(stamp: NDArray[np.int64], late: Array) -> tuple[Array | None, float]:
-    """(how far stamps are from their rhythm, scatter of receipt minus stamp) [s]."""
-    return about_rhythm(seconds(stamp - stamp[0])), _width(late)
+def _scatter_of(when: Array) -> Waits | None:
+    """How far stamps are from their rhythm, and whether late rather than early."""
+    about = about_rhythm(when)
+    if about is not None and _one_sided(about):
+        return Waits(about, spread(about), late=True, edged=False)
+    waits = waits_of(when)
+    if about is None or (waits is not None and waits.late):
+        return waits
+    return Waits(about, spread(about), late=False, edged=False)
+
+
+def _late_in_most(parts: Sequence[Waits | None]) -> bool:
+    """Whether parts of a log scatter late rather than early, each or all of them together."""
+    known = [part for part in parts if part is not None]
+    each = sum(part.late for part in known) > 0.5 * len(known)
+    return each or _one_sided(np.concatenate([part.about_s for part in known]))
 
 
 def _turn(above: Mask, *, last: bool) -> int:

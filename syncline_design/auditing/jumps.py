@@ -32,6 +32,7 @@ _ALIKE: Final = 0.35  # how near rhythm and level agree
 _SHARE: Final = 0.25  # of the delays' spread: smaller jumps are not named
 _BROKEN: Final = 0.05  # of an interval: what does not fit the rhythm
 _MOST_BROKEN: Final = 0.05  # of all intervals
+_TICKS: Final = 2.2  # how much larger a jump is than what many intervals are off by
 _GRAINS: Final = 2.2  # of the coarser time: both its values lie on a grid
 _ALONE: Final = 8.0  # times what the intervals around it are off by
 _REPEATED: Final = 0.9  # of an episode's stamps: old messages that are sent again
@@ -98,6 +99,11 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
     off = np.abs(pace.interval - np.round(pace.interval / period) * period)
     if float(np.mean(off > max(_BROKEN * period, noise))) > _MOST_BROKEN:
         return []  # no such rhythm
+    common = float(np.percentile(off, 100.0 * (1.0 - _MOST_BROKEN)))
+    if (
+        common > noise
+    ):  # ticks of the sensor's own task, of which an interval holds one more or less
+        noise = _TICKS * common
     off_here = off > np.maximum(noise, _ALONE * _around(off))
     counted = (pace.steps != 1.0) & ~at_another_rate(pace.steps)
     odd = np.flatnonzero(off_here | counted)[:_MOST]

@@ -168,9 +168,18 @@ def _row(opened: _Opened, one: Examined) -> StreamAudit:
         stamps=StampNames(stream.stamps.primary, stream.stamps.secondary),
         timeline=stream.timeline, quantity=stream.quantity,
         faults=_ordered(one), offset_s=one.offset_s,
-        residual_s=one.residual, smallest_seen=one.smallest, tau_crit_s=None, error_m=None,
+        residual_s=_residual(one), smallest_seen=one.smallest, tau_crit_s=None, error_m=None,
         cannot_show=_cannot_show(one), notes=stream.notes, trace=one.trace, partial=stream.partial,
     )  # fmt: skip
+
+
+def _residual(one: Examined) -> ResidualTime:
+    """What is left, with what stamps on arrival could hide counted."""
+    left = one.residual
+    if one.hidden is None or left.bound is None or left.p95 is None:
+        return left
+    bound, p95 = left.bound + one.hidden.seconds, left.p95 + one.hidden.seconds
+    return ResidualTime(bound, p95, max(bound, left.as_recorded or 0.0))
 
 
 def _ordered(one: Examined) -> tuple[StampFault, ...]:
@@ -199,6 +208,8 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
                     "which is latency or a clock's offset")  # fmt: skip
     else:
         said.append("its constant latency, nor how far its clock is from the recorder's")
+    if one.hidden is not None:
+        said.append(f"{one.hidden.words}; the bound counts {in_words(one.hidden.seconds)} for it")
     if one.breathing_s > 0.0:
         far = in_words(one.breathing_s)
         said.append(f"why receipts move to and fro by {far} while its stamps keep their rhythm: "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -15,6 +16,7 @@ from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.disorder import Disorder, disorder_of
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
+from syncline_design.auditing.late_scatter import waits_of
 from syncline_design.auditing.levels import smallest
 from syncline_design.auditing.result import (
     Consequence,
@@ -24,7 +26,7 @@ from syncline_design.auditing.result import (
     SmallestSeen,
     StampFault,
 )
-from syncline_design.auditing.series import NS, Array, Series, seconds, series_of
+from syncline_design.auditing.series import NS, Array, Series, seconds, series_of, spread
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
 from syncline_design.auditing.stream_epochs import as_declared, as_epochs, known_offset, with_epoch
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
@@ -32,11 +34,14 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 
 RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
+LATE_OR_COARSE: Final = frozenset({"packetised", "truncated_stamps", "stamped_on_arrival"})
 _SAMPLE: Final = 100_000  # messages that tell a resolution
 _AT_EDGES: Final = 0.1  # of the messages that were overtaken
 _STRAY: Final = 0.01
 EDGE_S: Final = 1.5  # how near to the end of a shift a repeated stamp is its own
 TRACE_POINTS: Final = 240
+_UNEVEN: Final = 0.1  # of an interval
+_FLOOR: Final = 48  # messages, of which the fastest hardly waits
 _LARGE_STEP_NS: Final = 1e6
 
 
@@ -60,6 +65,7 @@ class Examined:
     breathing_s: float = 0.0  # of receipts, while the stamps keep their rhythm
     overtaken: Disorder = Disorder()  # messages that came after later ones
     copied: bool = False  # receipts are the stamps once more
+    hidden: arrival.Hidden | None = None  # what stamps on arrival could hide here
 
 
 def examined(stream: Stream, start: int | None = None) -> Examined:
@@ -77,8 +83,8 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     else:
         found.append(disorder.fault)
     grain = _grain(series, step_ns, found)
-    arrived = None if grain else arrival.stamped_on_arrival(series, cadence(series))
-    part = None if grain or arrived else arrival.arrived_in_part(series, cadence(series))
+    part = None if grain else arrival.arrived_in_part(series, cadence(series))
+    arrived = None if grain or part else arrival.stamped_on_arrival(series, cadence(series))
     if part is not None:
         found.append(part.fault)
         series = replace(
@@ -108,7 +114,13 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     _last(series, pace, stream, known, grain, found)
     found = [f for f in found if not _at_edges(f, disorder)]
     whole = _summed(stream, raw, series, pace, found, (slips, moved), known)
-    return replace(whole, overtaken=disorder, copied=_copied(whole))
+    hidden = None if _late_or_coarse(found) else arrival.hidden_in(series, pace)
+    return replace(whole, overtaken=disorder, copied=_copied(whole), hidden=hidden)
+
+
+def _late_or_coarse(found: Sequence[StampFault]) -> bool:
+    """Whether stamps are known to be of arrivals, of packets or of a grid."""
+    return bool({f.fault for f in found} & LATE_OR_COARSE)
 
 
 def _receipts(stamps: Stamps) -> Nanoseconds | None:
@@ -212,9 +224,9 @@ def _last(
     names = {fault.fault for fault in found}
     if "packetised" not in names:
         coarse = grain is not None and grain.size_s > 0.5 * pace.period_s
-        late = "stamped_on_arrival" in names and pace.jitter_s > 0.1 * pace.period_s
+        late = any(_blurs(f, pace) for f in found if f.fault == "stamped_on_arrival")
         found += missing(series, pace, level_scatter(series), blurred=coarse or late)
-    if not names & {"packetised", "truncated_stamps", "stamped_on_arrival"}:
+    if not names & LATE_OR_COARSE:
         arrived = arrival.stamped_on_arrival(series, pace)
         found += [arrived] if arrived is not None else []
     if known is not None:
@@ -224,6 +236,12 @@ def _last(
     found += [fall] if fall is not None and "backward_jump" not in names else []
     scan = arrival.scan(series, stream.points)
     found += [scan] if scan is not None else []
+
+
+def _blurs(arrived: StampFault, pace: Cadence) -> bool:
+    """Whether arrivals are so uneven that a late message looks as a lost one."""
+    frame = float(arrived.parameters.get("interval_s", 0.0))
+    return max(pace.jitter_s, frame) > _UNEVEN * pace.period_s
 
 
 def _constant(
@@ -309,7 +327,7 @@ def _restored(series: Series, faults: tuple[StampFault, ...]) -> Array | None:
     whole = (series.receive - series.stamp)[places]
     late = seconds(whole - whole.min())
     names = {f.fault for f in faults}
-    if not names & {"packetised", "truncated_stamps", "stamped_on_arrival"}:
+    if not names & LATE_OR_COARSE:
         return late
     when = seconds(series.stamp[places] - series.stamp[places[0]])
     rhythm = _rhythm(when, cadence(series))
@@ -331,7 +349,18 @@ def _rhythm(when: Array, pace: Cadence) -> Array | None:
         grain = float(np.percentile(np.diff(when), 99.0))
         if float(np.ptp(when - even)) < 2.0 * grain + 2.0 * float(mean):
             return even
+        if _keeps_to(when, even):
+            return even
     return None
+
+
+def _keeps_to(when: Array, even: Array) -> bool:
+    """Whether messages that wait for longer than an interval keep to a line: their floor does."""
+    waits = waits_of(when)
+    if waits is None:
+        return False
+    away = (when - even)[: when.size // _FLOOR * _FLOOR].reshape(-1, _FLOOR)
+    return float(spread(away.min(axis=1))) < spread(waits.about_s)
 
 
 def _recorded(raw: Series, series: Series) -> Array:

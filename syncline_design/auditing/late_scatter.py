@@ -1,0 +1,64 @@
+"""How late messages of an even rhythm came, whatever their delays: above a floor, never below.
+
+Of messages measured at a + k T that wait d_k, s_k - k T = a + d_k never falls below a, so the least
+of every dozen in a row lies on one line (passive synchronisation: Olson 2010), however far they
+scatter above it.  What a sensor without rhythm measures walks away from any line, and a sensor that
+scatters about its rhythm does so to both sides.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from syncline_design.auditing.series import Array, scatter, spread
+from syncline_design.machine.quick_dataclass import dataclass
+
+_BLOCK: Final = 12  # messages, of which the fastest hardly waits
+_LEAST_BLOCKS: Final = 12
+_LAG: Final = 64
+_WALKS: Final = 0.45  # of a block's spread: how far floors differ; of a random walk 1.2
+_ONE_SIDED: Final = 0.55  # floors against ceilings; of a scatter to both sides 1
+_SHARP: Final = 0.3  # floors that are the edge of something, such as of a wait for the next turn
+_LAGS: Final = tuple(range(1, 13))
+_PATTERN: Final = 0.4  # of the scatter of intervals: what repeats itself is no chance
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Waits:
+    """Delays [s] of messages, each against the middle of its dozen.
+
+    reach_s: the longest but few, above the floor.  late: they reach further above it than they come
+    near to it.  edged: whether the floor is sharp, which a scatter to both sides has not.
+    """
+
+    about_s: Array
+    reach_s: float
+    late: bool
+    edged: bool
+
+
+def waits_of(when: Array) -> Waits | None:
+    """None where stamps [s] keep to no line, or repeat a pattern."""
+    if when.size < max(_LEAST_BLOCKS * _BLOCK, 2 * _LAG):
+        return None
+    period = float(np.median(when[_LAG:] - when[:-_LAG])) / _LAG
+    if period <= 0.0 or _repeats(np.diff(when)):
+        return None
+    away = when - period * np.arange(when.size)
+    blocks = away[: away.size // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
+    low, middle, high = (np.percentile(blocks, p, axis=1) for p in (0.0, 50.0, 100.0))
+    width = float(np.median(np.subtract(*np.percentile(blocks, [75.0, 25.0], axis=1))))
+    floors, ceilings = (scatter(np.diff(edge)) / float(np.sqrt(2.0)) for edge in (low, high))
+    if width <= 0.0 or floors > _WALKS * width:
+        return None
+    about = (blocks - middle[:, None]).ravel()
+    reach = float(np.percentile(blocks - low[:, None], 99.5))
+    return Waits(about, reach, floors < _ONE_SIDED * ceilings, floors < _SHARP * width)
+
+
+def _repeats(passed: Array) -> bool:
+    """Whether intervals come back after some messages: publishers in turn, brackets, decimation."""
+    scattered = [spread(passed[lag:] - passed[:-lag]) for lag in _LAGS]
+    return min(scattered) < _PATTERN * float(np.median(scattered))

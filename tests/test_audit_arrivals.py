@@ -1,0 +1,129 @@
+"""Stamps that say when a message came: over frames of USB, and after waits as long as an interval.
+
+Every world says itself when a sensor measured, when a bus handed the message over and when the
+recorder took it; the residual is held against the planted delays.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.auditing.result import StreamAudit
+from tests.test_audit_transport import even, found, said
+
+FRAME = 1e-3
+
+
+def on_frames(t: np.ndarray, rng: np.random.Generator, frame: float = FRAME) -> np.ndarray:
+    """When a host that is handed messages at the ends of frames reads its clock."""
+    phase = rng.uniform(0.0, frame)
+    taken = np.ceil((t - phase) / frame) * frame + phase
+    return np.maximum.accumulate(taken + 5e-6 + rng.exponential(3e-5, t.size))
+
+
+def recorded(stamp: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    return np.maximum.accumulate(stamp + 2e-5 + rng.exponential(5e-5, stamp.size))
+
+
+def hides(row: StreamAudit, words: str) -> bool:
+    return any("stamped on arrival" in said and words in said for said in row.cannot_show)
+
+
+@pytest.mark.parametrize(
+    ("rate", "ppm", "frame"),
+    [(100.0, 40.0, 1e-3), (97.3, 0.0, 1e-3), (10.0, 60.0, 1e-3), (134.1, 5.0, 5e-4)],
+)
+def test_arrivals_at_the_ends_of_usb_frames(
+    tmp_path: Path, rate: float, ppm: float, frame: float
+) -> None:
+    rng = np.random.default_rng(31)
+    t = even(rate, 60.0) * (1 + ppm * 1e-6)
+    stamp = on_frames(t + rng.gamma(2.0, 2e-5, t.size), rng, frame)
+    receive = recorded(stamp, rng)
+    row = said(tmp_path, stamp, receive)
+    fault = found(row)["stamped_on_arrival"]
+    assert set(found(row)) == {"stamped_on_arrival"}
+    assert fault.parameters["interval_s"] == frame
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.1)
+
+
+def test_frames_that_a_whole_interval_hides_are_said_and_counted(tmp_path: Path) -> None:
+    rng = np.random.default_rng(32)
+    t = 0.0171 + np.arange(3000) / 50.0
+    stamp = t + 3e-4 + rng.exponential(3e-5, t.size)  # no frame's edge within the log
+    receive = recorded(stamp, rng)
+    row = said(tmp_path, stamp, receive)
+    assert not found(row)
+    assert hides(row, "frames of 1 ms")
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - stamp) + FRAME, abs=1e-6)
+
+
+@pytest.mark.parametrize("ticks", [1e-3, 1.25e-4])
+def test_a_sensor_on_ticks_of_its_own_task_is_sound(tmp_path: Path, ticks: float) -> None:
+    rng = np.random.default_rng(33)
+    stamp = np.ceil(even(97.3, 60.0) / ticks) * ticks + 3.17e-4 + rng.normal(0.0, 1e-6, 5838)
+    row = said(tmp_path, stamp, recorded(stamp, rng))
+    assert not found(row)
+    assert not hides(row, "")
+
+
+def test_receipts_over_usb_of_stamps_of_the_sensor_are_sound(tmp_path: Path) -> None:
+    rng = np.random.default_rng(34)
+    t = even(100.0, 60.0) * (1 + 25e-6)
+    row = said(tmp_path, t + rng.normal(0.0, 2e-6, t.size), on_frames(t + 3e-4, rng))
+    assert not found(row)
+    assert not hides(row, "")
+
+
+@pytest.mark.parametrize("law", ["gamma", "exponential", "lognormal"])
+@pytest.mark.parametrize("share", [0.5, 1.2])
+def test_waits_as_long_as_an_interval(tmp_path: Path, law: str, share: float) -> None:
+    rng = np.random.default_rng(35)
+    t = even(100.0, 25.0)
+    draw = {
+        "gamma": lambda: rng.gamma(2.0, 0.5 * share / 100.0, t.size),
+        "exponential": lambda: rng.exponential(share / 100.0, t.size),
+        "lognormal": lambda: share / 100.0 * rng.lognormal(0.0, 0.7, t.size),
+    }
+    queue = 2e-5 * np.arange(t.size)  # one message after the other
+    stamp = np.maximum.accumulate(t + 1e-3 + draw[law]() - queue) + queue
+    receive = recorded(stamp, rng)
+    row = said(tmp_path, stamp, receive)
+    assert set(found(row)) == {"stamped_on_arrival"}
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.1)
+
+
+def test_waits_as_long_as_an_interval_from_some_message_on(tmp_path: Path) -> None:
+    rng = np.random.default_rng(36)
+    t = even(50.0, 70.0)
+    queue = 2e-5 * np.arange(t.size)
+    came = np.maximum.accumulate(t + 1e-3 + rng.gamma(2.0, 8e-3, t.size) - queue) + queue
+    row = found(said(tmp_path, np.where(t > 31.0, came, t), recorded(came, rng)))
+    assert set(row) == {"stamped_on_arrival"}
+    assert row["stamped_on_arrival"].from_s == pytest.approx(31.0, abs=0.3)
+
+
+@pytest.mark.parametrize("law", ["poisson", "even", "walk", "both sides"])
+def test_sensors_without_rhythm_are_not_accused(tmp_path: Path, law: str) -> None:
+    rng = np.random.default_rng(37)
+    n = 2500
+    t = {
+        "poisson": lambda: np.cumsum(rng.exponential(0.01, n)),
+        "even": lambda: np.cumsum(rng.gamma(8.0, 0.01 / 8.0, n)),
+        "walk": lambda: np.cumsum(0.01 * (1 + 0.4 * np.sin(np.arange(n) / 200.0))),
+        "both sides": lambda: np.sort(np.arange(n) * 0.01 + rng.normal(0.0, 0.003, n)),
+    }[law]()
+    assert not found(said(tmp_path, t, recorded(t, rng)))
+
+
+def test_waits_for_a_turn_that_a_trigger_makes_too_are_said_and_counted(tmp_path: Path) -> None:
+    rng = np.random.default_rng(38)
+    t = even(50.0, 60.0)
+    stamp = t + rng.uniform(0.0, 0.012, t.size)
+    row = said(tmp_path, stamp, recorded(stamp, rng))
+    assert not found(row)
+    assert hides(row, "sharp edge")
+    assert row.residual_s.bound == pytest.approx(0.012, rel=0.1)
