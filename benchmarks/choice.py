@@ -45,7 +45,7 @@ from syncline_design.choice.outcome import Deadline, FrontPoint, NoVerdict
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import Problem, with_limits
 from syncline_design.spec.load import load
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 
 SEED = 0
 NM = 1e9
@@ -238,7 +238,7 @@ def from_spec(repeat: int, *, quick: bool) -> None:
 
 
 def _steps(path: Path, repeat: int) -> list[float]:
-    """Seconds to read a spec, to make its tables, its front too, and of a whole optimisation."""
+    """Seconds to read a spec, to make its tables, its front too, and of a whole optimization."""
     started = time.process_time()
     case = load(path)
     steps = [time.process_time() - started]

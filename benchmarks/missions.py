@@ -3,7 +3,7 @@
 python benchmarks/missions.py agree FIRST COUNT     random families against every design tried
 python benchmarks/missions.py specs FIRST COUNT     random specs, each mission tried by itself
 python benchmarks/missions.py hinges FIRST COUNT    slack ledger and what to measure next, likewise
-python benchmarks/missions.py time MISSIONS SENSORS METHODS [ROLES]
+python benchmarks/missions.py time MISSIONS SENSORS ROAD_NAMES [ROLES]
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from syncline_design.comparison.accept import AcceptSettings
     from syncline_design.comparison.acceptance import Acceptance
     from syncline_design.comparison.clock_meaning import TimingAndSpec
-    from syncline_design.comparison.difference import Difference
+    from syncline_design.comparison.diff_result import Diff
     from syncline_design.comparison.meaning import DiagnosisAndDesign
     from syncline_design.diagnosis import Diagnosis
     from syncline_design.paper.reproduce import Reproduction
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from syncline_design.simulation import Simulation
     from syncline_design.studies import Progress, StudyResult
     from syncline_design.verdict.figure_front import FigureKind
-    from syncline_design.verdict.optimisation import Optimisation
+    from syncline_design.verdict.optimization import Optimization
     from syncline_design.verdict.tree import Verdict
 
 __all__ = [
@@ -83,6 +83,15 @@ def _seed(seed: int) -> int:
     return arguments.whole("seed", seed, 0)
 
 
+def _road(road: Road, method: Road | None) -> Road:
+    """The road that is asked for, by its present name or by the one it had before."""
+    from syncline_design.choice.outcome import ROAD_NAMES
+
+    asked = road if method is None else method
+    arguments.word("road" if method is None else "method", asked, ROAD_NAMES)
+    return asked
+
+
 def _limited(time_limit_s: float | None) -> AbstractContextManager[object]:
     """The time limit in force, once it is such as the commands take."""
     given = time_limit_s is not None
@@ -100,25 +109,26 @@ def _files(logs: str | Path | Sequence[str | Path]) -> list[Path]:
 
 
 def check(
-    spec: SpecOrPath, *, seed: int = 0, method: Road = "auto", time_limit_s: float | None = None,
+    spec: SpecOrPath, *, seed: int = 0, road: Road = "auto", time_limit_s: float | None = None,
     monte_carlo: bool = True, today: date | None = None, baseline: str | Path | None = None,
+    method: Road | None = None,
 ) -> Verdict:  # fmt: skip
     """The verdict on a spec.
 
     baseline: an earlier verdict as JSON; its exit code is then 0 where nothing got worse.
 
-    monte_carlo: whether to simulate (a requirement of that kind stays undecided without).  today:
-    the day on which waivers are judged; None: the machine's date.
+    road: to the proof of the best design; `method` is its earlier name.  monte_carlo: whether to
+    simulate (a requirement of that kind stays undecided without).  today: the day on which waivers
+    are judged; None: the machine's date.
     """
-    from syncline_design.choice.outcome import METHODS
     from syncline_design.comparison.verdict_file import read_verdicts
     from syncline_design.verdict.baseline import against
     from syncline_design.verdict.settings import CheckSettings
     from syncline_design.verdict.verify import check_loaded
 
-    arguments.word("method", method, METHODS)
+    road = _road(road, method)
     arguments.day("today", today)
-    settings = CheckSettings(_seed(seed), method, monte_carlo=monte_carlo, today=today)
+    settings = CheckSettings(_seed(seed), road, monte_carlo=monte_carlo, today=today)
     with _limited(time_limit_s):
         earlier = None if baseline is None else read_verdicts(Path(baseline))
         verdict = check_loaded(_case(spec), settings)
@@ -127,10 +137,10 @@ def check(
 
 def optimize(
     spec: SpecOrPath, *, best: int = 1, every: bool = False, pareto: bool = False,
-    resource: ResourceName = "cost", seed: int = 0, method: Road = "auto",
+    resource: ResourceName = "cost", seed: int = 0, road: Road = "auto",
     time_limit_s: float | None = None, why_not: str | Sequence[str] = (),
-    against: FigureKind | None = None,
-) -> Optimisation:  # fmt: skip
+    against: FigureKind | None = None, method: Road | None = None,
+) -> Optimization:  # fmt: skip
     """The best designs of a spec, proven, and what they hinge on.
 
     best: how many designs that differ in a sensor; every: in anything.  pareto: the exact front of
@@ -138,14 +148,13 @@ def optimize(
     quantile).  why_not: entries to answer for.
     """
     from syncline_design.choice.options import RESOURCES
-    from syncline_design.choice.outcome import METHODS
     from syncline_design.verdict.figure_front import FIGURES
-    from syncline_design.verdict.optimisation import OptimizeSettings
-    from syncline_design.verdict.optimise import optimize as optimised
+    from syncline_design.verdict.optimization import OptimizeSettings
+    from syncline_design.verdict.optimize import optimize as optimized
 
     best = arguments.whole("best", best, 1)
     arguments.word("resource", resource, RESOURCES)
-    arguments.word("method", method, METHODS)
+    road = _road(road, method)
     if against is not None:
         arguments.word("against", against, FIGURES)
     settings = OptimizeSettings(
@@ -153,13 +162,13 @@ def optimize(
         pareto,
         resource,
         against,
-        method,
+        road,
         seed=_seed(seed),
         every=every,
         why_not=_entries(why_not),
     )
     with _limited(time_limit_s):
-        return optimised(_case(spec), settings).result
+        return optimized(_case(spec), settings).result
 
 
 def simulate(
@@ -270,7 +279,7 @@ def study(
 
 def diff(
     old: str | Path, new: str | Path, *, seed: int = 0, time_limit_s: float | None = None
-) -> Difference:
+) -> Diff:
     """What changed between two specs, or two verdicts written as JSON."""
     from syncline_design.comparison import diff as comparison
     from syncline_design.verdict.settings import CheckSettings

@@ -20,7 +20,7 @@ from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPECS = Path(__file__).parent.parent / "specs"

@@ -34,6 +34,7 @@ def test_a_seed_is_a_whole_number(name: str, seed: Any) -> None:
     ("name", "handed"),
     [
         ("check", {"method": "nope"}),
+        ("check", {"road": "nope"}),
         ("check", {"today": "2030-01-31"}),
         ("check", {"today": datetime(2030, 1, 31)}),
         ("check", {"time_limit_s": float("nan")}),

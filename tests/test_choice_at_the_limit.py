@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEC = """\

@@ -17,7 +17,7 @@ import pytest
 import yaml
 
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEED, TURN_DEG, DISTANCE = 4.0, 6.0, 30.0

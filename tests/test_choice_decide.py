@@ -256,7 +256,7 @@ def test_auto_takes_the_milp_where_merging_gives_up(monkeypatch: pytest.MonkeyPa
 
 def test_unknown_method_is_refused() -> None:
     problem = one_stage([[option("a", 1.0, 0.0, 1)]] * 3, Limits(None, 1.0), 1.0, 1.0)
-    with pytest.raises(ValueError, match="unknown method 'fastest'"):
+    with pytest.raises(ValueError, match="unknown road 'fastest'"):
         choose(problem, "fastest")  # type: ignore[arg-type]
 
 

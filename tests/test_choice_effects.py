@@ -22,7 +22,7 @@ from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.optimise import Optimisation, OptimizeSettings, optimize
+from syncline_design.verdict.optimize import Optimization, OptimizeSettings, optimize
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SIGMA = {"fine": 0.05, "coarse": 0.20}  # m per axis
@@ -84,7 +84,7 @@ def total_m(sensor: str, factor: float, speed: float = 2.0, distance: float = 10
     return math.sqrt(3) * SIGMA[sensor] * factor + angles + 0.01 + rate * 2e-3
 
 
-def found(loaded: Case) -> Optimisation:
+def found(loaded: Case) -> Optimization:
     return optimize(loaded, OptimizeSettings(pareto=True, count=2)).result
 
 

@@ -45,7 +45,7 @@ from syncline_design.report.on_choice import (
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load, load_text
-from syncline_design.verdict.optimise import Optimisation, OptimizeSettings, optimize
+from syncline_design.verdict.optimize import Optimization, OptimizeSettings, optimize
 from syncline_design.verdict.recheck import recheck
 from test_choice_explain import spec
 from test_front import one_stage, option
@@ -337,6 +337,6 @@ def test_what_optimize_writes_is_what_its_schema_says(
     with within_s(limit_s):
         found = optimize(case, settings).result
     data = found.to_json()
-    jsonschema.validate(data, result_schema("optimisation"))
-    again = read_as(Optimisation, json.dumps(data)).to_json()
+    jsonschema.validate(data, result_schema("optimization"))
+    again = read_as(Optimization, json.dumps(data)).to_json()
     assert again == {key: value for key, value in data.items() if value is not None or key in again}

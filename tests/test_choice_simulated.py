@@ -19,14 +19,14 @@ from scipy.stats import chi
 from syncline_design.choice.table import Design
 from syncline_design.choice.tolerance import ToleranceVerdict, tolerance_verdict
 from syncline_design.report.on_choice import on_choice
-from syncline_design.report.optimisations import render_optimize
+from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
 from syncline_design.verdict import acceptance, settings
-from syncline_design.verdict import optimise as optimisation
+from syncline_design.verdict import optimize as optimization
 from syncline_design.verdict.acceptance import Simulations
-from syncline_design.verdict.optimise import (
+from syncline_design.verdict.optimize import (
     OptimizeSettings,
     optimize,
 )
@@ -319,7 +319,7 @@ def test_lists_that_simulation_cuts_short_say_so(
     whole = optimize(loaded, OptimizeSettings(count=9, pareto=True, report=True))
     assert "gave up" not in console(on_choice(whole))
     assert whole.result.gave_up == ()
-    monkeypatch.setattr(optimisation, "Simulations", few)
+    monkeypatch.setattr(optimization, "Simulations", few)
     monkeypatch.setattr(settings, "Simulations", few)
     found = optimize(loaded, OptimizeSettings(count=9, pareto=True, report=True))
     data = found.result.to_json()

@@ -242,5 +242,5 @@ def test_unknown_amounts_come_last_among_ties(tmp_path: Path) -> None:
         text = spec_text().replace("[gnss_a, gnss_b]", "[gnss_a, gnss_z]")
         path = written(tmp_path, text, own)
         for road in ("auto", "front", "milp", "enumerate"):
-            found = check_file(path, CheckSettings(monte_carlo=False, method=road)).to_json()  # type: ignore[arg-type]
+            found = check_file(path, CheckSettings(monte_carlo=False, road=road)).to_json()  # type: ignore[arg-type]
             assert found["design"]["stages"][0]["roles"]["position"]["sensor"] == priced, road

@@ -12,10 +12,10 @@ import pytest
 from study_specs import SPEC
 from syncline_design.comparison import diff as comparison_diff
 from syncline_design.comparison.diff import diff
-from syncline_design.comparison.difference import SCHEMA, Difference
+from syncline_design.comparison.diff_result import SCHEMA, Diff
 from syncline_design.machine.records import read_as, schema_of
 from syncline_design.report.json_out import json_text
-from syncline_design.report.on_difference import DIFF_FORMATS, headline, on_difference, render_diff
+from syncline_design.report.on_diff import DIFF_FORMATS, headline, on_diff, render_diff
 from syncline_design.report.render_console import console
 from syncline_design.spec.files import Collection
 from syncline_design.spec.load import BadInput
@@ -109,7 +109,7 @@ def test_a_decimetre_less_changes_the_payload_and_the_difference_says_why(
     assert limits[1] < row.old.value < limits[0]
     assert data.outgrown == ("TVU-1",)
     why = f"What was chosen before has TVU-1 at {1e3 * row.old.value:.1f}\N{NO-BREAK SPACE}mm; the"
-    assert why in " ".join(on_difference(data).sentences)
+    assert why in " ".join(on_diff(data).sentences)
     back = diff(*stored[::-1], PLAIN)
     assert (back.outgrown, back.admitted) == (None, ("TVU-1",))
 
@@ -124,7 +124,7 @@ def test_several_changes_say_which_one_does_it(files: tuple[Path, Path]) -> None
         "stages[uav].distance": "meets",
     }
     assert data.exit_code == 0
-    assert "alone: now has no design that meets its requirements" in console(on_difference(data))
+    assert "alone: now has no design that meets its requirements" in console(on_diff(data))
 
 
 def test_a_simulated_limit_alone_does_what_checking_it_alone_says(files: tuple[Path, Path]) -> None:
@@ -263,9 +263,7 @@ def test_each_side_keeps_its_currency(
     data = diff(*sides, PLAIN)
     euros, dollars = (f"{v['design']['cost']:,.2f}".replace(",", " ") for v in verdicts)
     first, second = ("USD", "EUR") if back else ("EUR", "USD")
-    shown = [render_diff(name, data) for name in ("markdown", "html")] + [
-        console(on_difference(data))
-    ]
+    shown = [render_diff(name, data) for name in ("markdown", "html")] + [console(on_diff(data))]
     for text in shown:
         plain = text.replace("\N{NO-BREAK SPACE}", " ")
         assert f"{euros} {first}" in plain
@@ -287,7 +285,7 @@ def test_what_was_taken_out_reads_as_it_was_written(files: tuple[Path, Path]) ->
     change(old, ("requirements:\n", "requirements:\n" + line))
     drift = "effects:\n  - {effect: latency, sensor: position, parameters: {latency_s: 0.0010}}\n"
     new.write_text(new.read_text(encoding="utf-8") + drift, encoding="utf-8")
-    text = console(on_difference(diff(old, new, PLAIN)))
+    text = console(on_diff(diff(old, new, PLAIN)))
     assert '"quantile": 0.950, "limit": "0.90 m"' in text
     assert '"parameters": {"latency_s": 0.0010}' in text
     assert '"number"' not in text
@@ -298,12 +296,12 @@ def test_a_difference_satisfies_its_schema_and_reads_back(files: tuple[Path, Pat
     change(files[1], DISTANCE, ("limit: 0.30 m", "limit: 0.15 m"))
     several = diff(*files, PLAIN)
     change(files[1], ("limit: 0.15 m", "limit: 1 mm"))
-    schema = schema_of(Difference, SCHEMA, "difference")
+    schema = schema_of(Diff, SCHEMA, "diff")
     jsonschema.Draft202012Validator.check_schema(schema)
     for found in (several, diff(*files, PLAIN), diff(files[1], files[1], PLAIN)):
         text = json_text(found.to_json())
         jsonschema.validate(json.loads(text), schema)
-        assert read_as(Difference, text) == found
+        assert read_as(Diff, text) == found
 
 
 def _stored(spec: Path) -> Path:
@@ -356,7 +354,7 @@ def test_a_waived_requirement_reads_waived(files: tuple[Path, Path], stored: boo
     row = next(entry for entry in found.requirements if entry.id == "SYNC-1")
     assert (row.old and row.old.status, row.new and row.new.status) == ("fail", "fail")
     assert (row.old and row.old.waived, row.new and row.new.waived) == (None, True)
-    shown = next(line for line in console(on_difference(found)).splitlines() if "  SYNC-1" in line)
+    shown = next(line for line in console(on_diff(found)).splitlines() if "  SYNC-1" in line)
     assert shown.count("fail") == 1
     assert shown.count("waived") == 1
 

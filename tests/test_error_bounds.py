@@ -1,4 +1,4 @@
-"""The printed upper bound holds: an own chain, random situations and an optimiser never beat it."""
+"""The printed upper bound holds: an own chain, random situations and an optimizer never beat it."""
 
 from __future__ import annotations
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 
 from family_specs import Raw, written
-from syncline_design.report.optimisations import render_optimize
+from syncline_design.report.optimizations import render_optimize
 from syncline_design.spec.load import BadInput, load
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 
 SIGMA_M = {"poor": 0.20, "fair": 0.10, "fine": 0.02}
 PRICE = {"poor": 100, "fair": 300, "fine": 300, "slow": 0, "quick": 150}

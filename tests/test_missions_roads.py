@@ -176,7 +176,7 @@ def _shipped_without(tmp_path: Path, sensor: str) -> Verdict:
 
 
 def test_alternatives_are_what_the_spec_without_the_sensor_says(tmp_path: Path) -> None:
-    found = check_file(SHIPPED, CheckSettings(monte_carlo=False, method="milp"))
+    found = check_file(SHIPPED, CheckSettings(monte_carlo=False, road="milp"))
     assert found.choice is not None
     assert found.choice.proof is not None
     assert (found.choice.proof.method, found.choice.proof.agrees_with) == ("milp", ("front",))

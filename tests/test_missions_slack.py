@@ -13,8 +13,8 @@ import pytest
 from family_specs import Raw, Tried, drawn, grown, payload, sheet_figures, written
 from syncline_design.choice.slack import Slack
 from syncline_design.spec.load import load
-from syncline_design.verdict.optimisation import Optimisation
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimization import Optimization
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 
 NEAR = 1e-5
 
@@ -25,7 +25,7 @@ class Family:
     def __init__(self, folder: Path, seed: int) -> None:
         self.spec, self.parts = drawn(seed)
         case = load(written(folder, self.spec, self.parts))
-        self.said: Optimisation = optimize(case, OptimizeSettings()).result
+        self.said: Optimization = optimize(case, OptimizeSettings()).result
         self.tried = Tried(self.spec, self.parts)
         self.roles = [(role, one) for _, role, one in self.said.designs[0].design.roles]
         self.own = tuple((one.sensor, one.timestamping) for _, one in self.roles)

@@ -13,8 +13,8 @@ from plain_enumeration import number
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import load
-from syncline_design.verdict.optimisation import OptimizeSettings
-from syncline_design.verdict.optimise import optimize
+from syncline_design.verdict.optimization import OptimizeSettings
+from syncline_design.verdict.optimize import optimize
 from syncline_design.verdict.why_not import HeldBack, NotTaken
 from test_missions_fixes import ROLES, _least, _spec
 

@@ -14,11 +14,11 @@ from syncline_design.report import numbers
 from syncline_design.report.axes import log_ticks
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_verdict import on_verdict
-from syncline_design.report.optimisations import render_optimize
+from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.optimise import (
+from syncline_design.verdict.optimize import (
     OptimizeSettings,
     optimize,
 )
@@ -54,7 +54,7 @@ def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
 @pytest.mark.parametrize("method", ["front", "milp", "enumerate"])
 def test_the_page_says_in_words_how_the_choice_was_proven(method: Any) -> None:
     words = {"front": "Pareto front", "milp": "integer program", "enumerate": "enumeration of all"}
-    verdict = check_file(MULTIROTOR, CheckSettings(method=method, monte_carlo=False))
+    verdict = check_file(MULTIROTOR, CheckSettings(road=method, monte_carlo=False))
     assert verdict.choice is not None
     assert verdict.choice.proof is not None
     assert verdict.choice.proof.method == method

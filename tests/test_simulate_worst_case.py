@@ -1,4 +1,4 @@
-"""The bounded mode: worst case by optimisation, its bound, both of the paper's comparisons."""
+"""The bounded mode: worst case by optimization, its bound, both of the paper's comparisons."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_random_choices_never_exceed_the_bound_nor_the_found(system: System) -> 
 
 
 @pytest.mark.parametrize("tau", [1e-5, 1e-2, 0.5])
-def test_another_optimiser_finds_no_more(tau: float) -> None:
+def test_another_optimizer_finds_no_more(tau: float) -> None:
     """SciPy's SLSQP from eight random starts: at most 0.02 % above what the ascent found."""
     system = fixed_wing()
     (worst,) = worst_cases(system, np.array([tau]), seed=0)

@@ -19,7 +19,7 @@ from syncline_design.choice.slack import slack_ledger
 from syncline_design.model.timing import Uniform
 from syncline_design.spec.load import load_text
 from syncline_design.verdict import acceptance
-from syncline_design.verdict.optimise import Optimisation, OptimizeSettings, optimize
+from syncline_design.verdict.optimize import Optimization, OptimizeSettings, optimize
 
 LIMIT, SHARE = 0.5, 0.9
 SIGMA, LATE, SPEED = 0.1, 0.1, 2.0
@@ -72,7 +72,7 @@ EDGES = {
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[Optimisation, list[tuple[bool, int]]]:
+def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[Optimization, list[tuple[bool, int]]]:
     """The ledger, and of each decision whether it was of the spec itself and its largest look."""
     folder: Path = tmp_path_factory.mktemp("ledger")
     (folder / "alone.yaml").write_text(CATALOG)
@@ -98,7 +98,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[Optimisation, list[
 
 @pytest.mark.parametrize("term", EDGES)
 def test_edges_are_where_the_quantile_reaches_its_limit(
-    found: tuple[Optimisation, list[tuple[bool, int]]], term: str
+    found: tuple[Optimization, list[tuple[bool, int]]], term: str
 ) -> None:
     """To the 1 % that simulation tells values apart, and half of one for its own error."""
     (row,) = [one for one in found[0].slack or () if one.term == term]
@@ -109,7 +109,7 @@ def test_edges_are_where_the_quantile_reaches_its_limit(
 
 
 def test_what_ifs_are_left_open_after_as_many_samples_as_stated(
-    found: tuple[Optimisation, list[tuple[bool, int]]],
+    found: tuple[Optimization, list[tuple[bool, int]]],
 ) -> None:
     what_ifs = [samples for own, samples in found[1] if not own]
     assert len(what_ifs) > 20

@@ -23,7 +23,7 @@ from syncline_design.cli.app import app
 from syncline_design.cli.shared import guarded
 from syncline_design.comparison.diff import diff
 from syncline_design.machine.streams import harmless
-from syncline_design.report.on_difference import on_difference
+from syncline_design.report.on_diff import on_diff
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import BadInput
 from tests.checked import check_file
@@ -189,7 +189,7 @@ def test_broken_verdict_files_are_refused_not_stumbled_over(folder: Path) -> Non
         broken.write_text(json.dumps(data))
         for old, new in ((good, broken), (broken, good)):
             try:
-                console(on_difference(diff(old, new)))
+                console(on_diff(diff(old, new)))
             except BadInput:
                 refused += 1
     assert 0 < refused < 600

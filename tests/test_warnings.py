@@ -12,10 +12,10 @@ import pytest
 from syncline_design.report.checks import render_checks
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_verdict import on_verdict
-from syncline_design.report.optimisations import render_optimize
+from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 

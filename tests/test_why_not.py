@@ -15,7 +15,7 @@ from questions_oracle import answers_of, best, case_of, compare_why_not, drawn
 from syncline_design.cli.app import app
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.render_console import console
-from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.why_not import HeldBack, NotTaken
 
 SPECS = Path(__file__).parent.parent / "specs"

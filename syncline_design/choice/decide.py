@@ -15,7 +15,7 @@ from syncline_design.choice.judged import judgement
 from syncline_design.choice.merged_front import merged_front
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import (
-    METHODS,
+    ROAD_NAMES,
     Choice,
     Deadline,
     Infeasible,
@@ -45,8 +45,8 @@ def choose(problem: Problem, road: Road = "auto") -> Choice | Infeasible:
     ends without a proof or two roads disagree.  A deadline that ends the search leaves a design
     that meets every sum and is not proven optimal, where one was found.
     """
-    if road not in METHODS:
-        raise ValueError(f"unknown method {road!r}; expected one of {', '.join(METHODS)}")
+    if road not in ROAD_NAMES:
+        raise ValueError(f"unknown road {road!r}; expected one of {', '.join(ROAD_NAMES)}")
     if is_empty(problem):
         return Infeasible(Proof("tables", True, True))
     deadline = in_force()

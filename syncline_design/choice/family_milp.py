@@ -47,7 +47,7 @@ def family_by_milp(family: Family, deadline: Deadline) -> FamilyDesign | None:
     if count > MOST_BINARIES:
         raise TooLarge(
             f"{count} ways of taking the roles are too many for the integer program of a family "
-            f"(at most {MOST_BINARIES}); leave --method out"
+            f"(at most {MOST_BINARIES}); leave --road out"
         )
     solver = Solver(deadline)
     solver.demand_canary()

@@ -32,7 +32,7 @@ FixKind = Literal[
     "missions",
 ]
 NO_SINGLE_CHANGE = "No single change was found to help."
-METHODS: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
+ROAD_NAMES: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
 # The roads in words, for every text that says how a design was proven best.
 ROADS: dict[str, str] = {
     "front": "the exact Pareto front",

@@ -12,9 +12,9 @@ import typer
 from syncline_design.cli.shared import (
     CheckOutput,
     DiffOutput,
-    MethodOption,
     OptimizeOutput,
     QuietOption,
+    RoadOption,
     SeedOption,
     SpecArgument,
     StudyOutput,
@@ -23,10 +23,10 @@ from syncline_design.cli.shared import (
     deadline_of,
     emit,
     guarded,
+    known_road,
     output_targets,
     pictured,
     refuse,
-    road,
     watched,
 )
 from syncline_design.machine.streams import say
@@ -34,7 +34,7 @@ from syncline_design.report.formats import PICTURED
 
 if TYPE_CHECKING:
     from syncline_design.report.document import Document
-    from syncline_design.verdict.optimisation import Optimised
+    from syncline_design.verdict.optimization import Optimized
     from syncline_design.verdict.tree import Checked, Verdict
 
 
@@ -44,7 +44,7 @@ def check(
     output: CheckOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
-    method: MethodOption = "auto",
+    road: RoadOption = "auto",
     time_limit: TimeLimitOption = None,
     skip_others: Annotated[
         bool, typer.Option("--skip-others", help="Pass over named files that are no specs too.")
@@ -75,7 +75,7 @@ def check(
         found = spec_files(spec, skip_others=skip_others)
     given = [] if baseline is None else [baseline]
     targets = output_targets(output, pictured(CHECK_FORMATS), [*found.files, *given])
-    settings = CheckSettings(seed=seed, method=road(method), explain=tuple(explain or ()),
+    settings = CheckSettings(seed=seed, road=known_road(road), explain=tuple(explain or ()),
                              cloud=any(t.format in PICTURED for t in targets))  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
         earlier = None if baseline is None else read_verdicts(baseline)
@@ -143,7 +143,7 @@ def optimize(
     output: OptimizeOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
-    method: MethodOption = "auto",
+    road: RoadOption = "auto",
     time_limit: TimeLimitOption = None,
     best: Annotated[int, typer.Option(min=1, help="How many designs that differ in a sensor.")] = 1,
     every: Annotated[
@@ -173,21 +173,21 @@ def optimize(
     """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
     deadline = deadline_of(time_limit)
     from syncline_design.report.on_choice import on_choice
-    from syncline_design.report.optimisations import (
+    from syncline_design.report.optimizations import (
         OPTIMIZE_FORMATS,
-        on_optimised,
+        on_optimized,
         render_optimize,
     )
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
     from syncline_design.verdict.admitted import NoSuchEntry
-    from syncline_design.verdict.optimisation import OptimizeSettings
-    from syncline_design.verdict.optimise import optimize
+    from syncline_design.verdict.optimization import OptimizeSettings
+    from syncline_design.verdict.optimize import optimize
 
     targets = output_targets(output, pictured(OPTIMIZE_FORMATS), [spec], [write_design])
     drawn, figure = _axes(resource, against)
     settings = OptimizeSettings(
-        best, pareto, drawn, figure, road(method), seed=seed,
+        best, pareto, drawn, figure, known_road(road), seed=seed,
         every=every, why_not=tuple(dict.fromkeys(why_not or ())),
         report=any(target.format in PICTURED for target in targets),
     )  # fmt: skip
@@ -202,7 +202,7 @@ def optimize(
     if write_design is not None and found.result.exit_code == 0:
         _write_design(found, write_design)
     emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet,
-         charts=lambda: {"": on_optimised(found)})  # fmt: skip
+         charts=lambda: {"": on_optimized(found)})  # fmt: skip
     return found.result.exit_code
 
 
@@ -229,7 +229,7 @@ def _refuse_elsewhere(path: Path, catalogs: Sequence[str]) -> None:
             )
 
 
-def _write_design(found: Optimised, path: Path) -> None:
+def _write_design(found: Optimized, path: Path) -> None:
     from syncline_design.spec.edit import write_spec
     from syncline_design.verdict.pinned import pinned_text
 
@@ -311,12 +311,12 @@ def diff(
     """Say in words what changed between two specs or verdicts; the exit code is the new one's."""
     deadline = deadline_of(time_limit)
     from syncline_design.comparison.diff import diff as compare
-    from syncline_design.report.on_difference import DIFF_FORMATS, on_difference, render_diff
+    from syncline_design.report.on_diff import DIFF_FORMATS, on_diff, render_diff
     from syncline_design.report.render_console import console
     from syncline_design.verdict.settings import CheckSettings
 
     targets = output_targets(output, DIFF_FORMATS, [old, new])
     with watched(deadline, targets, quiet=quiet):
         found = compare(old, new, CheckSettings(seed=seed))
-    emit(console(on_difference(found)), targets, lambda name: render_diff(name, found), quiet=quiet)
+    emit(console(on_diff(found)), targets, lambda name: render_diff(name, found), quiet=quiet)
     return found.exit_code

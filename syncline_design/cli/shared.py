@@ -41,7 +41,10 @@ _COMMAND: ContextVar[str] = ContextVar("command", default="report")  # that runs
 SpecArgument = Annotated[Path, typer.Argument(help="System spec (YAML).", show_default=False)]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of every random number.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No text, only the exit code.")]
-MethodOption = Annotated[str, typer.Option(help="auto, front, milp or enumerate.")]
+RoadOption = Annotated[
+    str,
+    typer.Option("--road", "--method", help="To the proof: auto, front, milp or enumerate."),
+]
 TimeLimitOption = Annotated[
     float | None,
     typer.Option(min=0.0, help="Seconds for the whole command; then what is known."),
@@ -283,8 +286,8 @@ def watched(
         line.clear()
 
 
-def road(name: str) -> Any:
+def known_road(name: str) -> Any:
     known = ("auto", "front", "milp", "enumerate")
     if name not in known:
-        refuse(f"syncline-design: --method {name}: expected one of {', '.join(known)}")
+        refuse(f"syncline-design: --road {name}: expected one of {', '.join(known)}")
     return name

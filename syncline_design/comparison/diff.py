@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from syncline_design.comparison.difference import Cause, Difference, changes, difference
+from syncline_design.comparison.diff_result import Cause, Diff, changes, diff_of
 from syncline_design.comparison.limits import limit_texts
 from syncline_design.comparison.verdict_file import read_verdict, text_of
 from syncline_design.machine.deadline import NoVerdict, in_force
@@ -49,7 +49,7 @@ class Side:
 Found = Iterator[tuple[Cause, KeyPath | None]]  # with its place in the old spec, where it has one
 
 
-def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None) -> Difference:
+def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None) -> Diff:
     """The difference of two specs or verdict files (schema syncline-design/diff/v1)."""
     chosen = settings or CheckSettings()
     before, after = read_side(Path(old), chosen), read_side(Path(new), chosen)
@@ -57,7 +57,7 @@ def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None
     causes = list(_causes(before, after))
     if before.case is not None and after.case is not None and 1 < len(causes) <= MOST_TRIED:
         causes = [(_tried(cause, path, before, after, chosen), path) for cause, path in causes]
-    return difference(
+    return diff_of(
         (before.file, after.file),
         tuple(cause for cause, _ in causes),
         changes(before.verdict, after.verdict),

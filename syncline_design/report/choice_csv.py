@@ -11,10 +11,10 @@ from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem
 from syncline_design.report.csv_out import plain_csv
-from syncline_design.verdict.optimisation import Optimised
+from syncline_design.verdict.optimization import Optimized
 
 
-def optimisation_csv(found: Optimised) -> str:
+def optimization_csv(found: Optimized) -> str:
     """The front with --pareto, else the designs."""
     if found.text is not None:
         return family_csv(found)
@@ -23,7 +23,7 @@ def optimisation_csv(found: Optimised) -> str:
     return designs_csv(found.problem, found.designs)
 
 
-def family_csv(found: Optimised) -> str:
+def family_csv(found: Optimized) -> str:
     """Of several missions the front or the designs, their error the largest of any mission."""
     resource = found.settings.resource
     listed = found.result.front if found.settings.pareto else found.result.designs

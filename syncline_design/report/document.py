@@ -72,7 +72,7 @@ class Facts:
 
     kind: ClassVar = "facts"
     pairs: Pairs
-    look: Literal["facts", "record", "terms"] = "facts"
+    form: Literal["facts", "record", "terms"] = "facts"
     reach: Audience = "everywhere"
 
 
@@ -146,7 +146,7 @@ class Group:
 
     kind: ClassVar = "group"
     nodes: tuple[Node, ...]
-    look: Literal["article", "column", "split", "pair", "flow", "trio", "alone", "fold"] = "column"
+    form: Literal["article", "column", "split", "pair", "flow", "trio", "alone", "fold"] = "column"
     key: str = ""
     summary: str = ""  # of a fold
     reach: Audience = "everywhere"

@@ -24,9 +24,9 @@ def laid_out(nodes: Sequence[Node]) -> tuple[Node, ...]:
 
 def _inner(nodes: Iterable[Node]) -> Iterator[Node]:
     for node in nodes:
-        if isinstance(node, Group) and node.look in ("article", "column", "fold"):
+        if isinstance(node, Group) and node.form in ("article", "column", "fold"):
             yield replace(node, nodes=laid_out(node.nodes))
-        elif isinstance(node, Group) and node.look == "pair":
+        elif isinstance(node, Group) and node.form == "pair":
             yield from node.nodes if len(list(charts([node]))) == len(node.nodes) else (node,)
         else:
             yield node

@@ -14,7 +14,7 @@ from syncline_design.report.words import OUTCOMES
 if TYPE_CHECKING:
     from syncline_design.diagnosis.result import Finding
     from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
-    from syncline_design.verdict.optimisation import Optimisation
+    from syncline_design.verdict.optimization import Optimization
 
 _HERE: Final = __name__
 _REPORT: Final = "syncline_design.report"
@@ -23,9 +23,9 @@ _MAKERS: Final = {
     "Acceptance": (f"{_REPORT}.on_acceptance", "on_acceptance"),
     "Audit": (f"{_REPORT}.on_audit", "on_audit"),
     "DiagnosisAndDesign": (f"{_REPORT}.on_diagnosis", "on_diagnosis"),
-    "Difference": (f"{_REPORT}.on_difference", "on_difference"),
+    "Diff": (f"{_REPORT}.on_diff", "on_diff"),
     "Finding": (_HERE, "on_finding"),
-    "Optimisation": (_HERE, "on_optimisation"),
+    "Optimization": (_HERE, "on_optimization"),
     "PlanRun": (f"{_REPORT}.on_plan", "on_plan"),
     "Reproduction": (f"{_REPORT}.on_paper", "on_paper"),
     "Simulation": (f"{_REPORT}.on_simulation", "on_simulation"),
@@ -59,14 +59,14 @@ def on_finding(found: Finding) -> Document:
     return Document("Finding", outcome, name, (found.sentence,), (), tuple(nodes))
 
 
-def on_optimisation(result: Optimisation) -> Document:
-    """An optimisation by its data alone: the best designs, and the front where it was asked for."""
+def on_optimization(result: Optimization) -> Document:
+    """An optimization by its data alone: the best designs, and the front where it was asked for."""
     currency = result.designs[0].design.currency if result.designs else ""
     designs = _designs("Best designs", result.designs, currency)
     front = _designs("Exact front", result.front or (), currency)
     said = () if result.message is None else (result.message,)
     return Document(
-        family="Optimisation",
+        family="Optimization",
         outcome=OUTCOMES[result.verdict],
         name=result.spec.name,
         sentences=said,

@@ -39,13 +39,13 @@ from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
 from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
-from syncline_design.verdict.optimisation import Optimisation, Optimised
+from syncline_design.verdict.optimization import Optimization, Optimized
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
 
 
-def on_choice(found: Optimised) -> Document:
+def on_choice(found: Optimized) -> Document:
     """The best designs of a spec as a document, or why there is none."""
     currency, result = found.case.spec.currency, found.result
     if found.text is None:
@@ -54,7 +54,7 @@ def on_choice(found: Optimised) -> Document:
         designs = family_designs_table(result.designs, currency)
     without = alternatives_table(result.alternatives or (), currency)
     return Document(
-        family="Optimisation",
+        family="Optimization",
         outcome=_outcome(found),
         name=found.case.spec.name,
         sentences=tuple(_sentences(found)),
@@ -74,7 +74,7 @@ def on_choice(found: Optimised) -> Document:
     )
 
 
-def why_not_section(result: Optimisation, currency: str) -> list[Section]:
+def why_not_section(result: Optimization, currency: str) -> list[Section]:
     """What `--why-not` asked about."""
     return section("why-not", "Why not", why_not_nodes(result.why_not, currency))
 
@@ -83,7 +83,7 @@ def _items(lines: Sequence[str]) -> list[Node]:
     return [Items(tuple(lines))] if lines else []
 
 
-def _outcome(found: Optimised) -> Outcome:
+def _outcome(found: Optimized) -> Outcome:
     if found.result.verdict != "meets":
         return OUTCOMES[found.result.verdict]
     objective = found.case.spec.objective
@@ -92,14 +92,14 @@ def _outcome(found: Optimised) -> Outcome:
     return Outcome("good", "\u2713", f"Design of {best}, {how}{qualification(found.result)}")
 
 
-def _sentences(found: Optimised) -> list[str]:
+def _sentences(found: Optimized) -> list[str]:
     """How it is known, or why it is not."""
     if found.result.message is not None:
         return [found.result.message]
     return [_proof(found.result, found.case.spec.objective)] if found.result.designs else []
 
 
-def _proof(result: Optimisation, objective: str) -> str:
+def _proof(result: Optimization, objective: str) -> str:
     proof, size = result.proof, _size(result.combinations or "")
     if not proof.optimal:
         gap = (
@@ -126,7 +126,7 @@ def _size(combinations: str) -> str:
     return combinations if len(combinations) < 7 else numbers.number(float(combinations), 3)
 
 
-def incomplete_lines(result: Optimisation) -> list[str]:
+def incomplete_lines(result: Optimization) -> list[str]:
     """Which parts lack designs: by the time limit, or because simulation is bounded."""
     lines = []
     if result.cut_short and result.message is None:
@@ -139,7 +139,7 @@ def incomplete_lines(result: Optimisation) -> list[str]:
     return lines
 
 
-def _why_not(found: Optimised, currency: str) -> list[Section]:
+def _why_not(found: Optimized, currency: str) -> list[Section]:
     result, case = found.result, found.case
     if result.infeasibility is None:
         return []
@@ -254,7 +254,7 @@ def _open_text(requirements: Sequence[str]) -> str:
     return f"{', '.join(requirements)} undecided" if requirements else ""
 
 
-def _front(found: Optimised) -> list[Section]:
+def _front(found: Optimized) -> list[Section]:
     """The exact front and what each accuracy costs on it."""
     resource, currency = found.settings.resource, found.case.spec.currency
     nodes: list[Node] = []
@@ -289,12 +289,12 @@ OVER_FIGURE = (
 OF_MISSIONS = "Of several missions the largest figure counts."
 
 
-def figure_front(found: Optimised) -> list[Section]:
+def figure_front(found: Optimized) -> list[Section]:
     """The front over a figure of the error, for a page that has the Syncline's beside it."""
     return _front(found) if found.result.front_figure is not None else []
 
 
-def _figure_chart(found: Optimised, words: str) -> list[Node]:
+def _figure_chart(found: Optimized, words: str) -> list[Node]:
     """The front over a figure of the error as a staircase, the best design where it is on it."""
     best = found.designs[0] if found.designs else None
     points = [
@@ -366,7 +366,7 @@ def staircase_table(
     return table("What accuracy costs" if figure is None else "What it costs", heads, rows)
 
 
-def hinges_nodes(hinges: Optimisation) -> list[Node]:
+def hinges_nodes(hinges: Optimization) -> list[Node]:
     """Slack of every figure, tolerances, what to measure next."""
     nodes = [] if hinges.slack is None else show(slack_table(hinges.slack))
     if hinges.tolerances is not None:

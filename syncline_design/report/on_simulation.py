@@ -101,7 +101,7 @@ def _grid(result: Simulation, system: System | None) -> list[Node]:
     )
     return [
         Text("Every magnitude is held to its Syncline term and the directions are free: the "
-             "largest error is found by optimisation, not by luck of sampling."),
+             "largest error is found by optimization, not by luck of sampling."),
         Text(said),
         *_grid_chart(result.grid),
         *show(_grid_table(result.grid, reasons=True), silent=True, reach="page"),

@@ -89,7 +89,7 @@ def _lines(nodes: Iterable[Node], indent: str, paint: Paint) -> Iterator[str]:
                 mark = f"{paint(node.mark, node.tone)} " if node.mark else ""
                 yield from _wrapped(plain(node.words), indent, indent + mark)
             case Facts():
-                yield from (_terms if node.look == "terms" else _pairs)(node.pairs, indent)
+                yield from (_terms if node.form == "terms" else _pairs)(node.pairs, indent)
             case Items():
                 yield from _items(node, indent, paint)
             case TableNode():

@@ -8,7 +8,7 @@ from typing import Any, Final
 from syncline_design.auditing import result as auditing
 from syncline_design.campaign import watch_result
 from syncline_design.clocks import result as clocks
-from syncline_design.comparison import acceptance, clock_meaning, difference, meaning
+from syncline_design.comparison import acceptance, clock_meaning, diff_result, meaning
 from syncline_design.diagnosis import result as diagnosis
 from syncline_design.logs import inspection
 from syncline_design.machine.records import schema_of
@@ -20,7 +20,7 @@ from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
 from syncline_design.spec import catalog_check
 from syncline_design.studies import data as study
-from syncline_design.verdict import optimisation
+from syncline_design.verdict import optimization
 from syncline_design.verdict import tree as verdict
 
 RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
@@ -30,9 +30,9 @@ RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "catalog-entry": (catalogs.WholeEntry, catalogs.ENTRY_SCHEMA),
     "catalog-list": (catalogs.CatalogList, catalogs.LIST_SCHEMA),
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
-    "difference": (difference.Difference, difference.SCHEMA),
+    "diff": (diff_result.Diff, diff_result.SCHEMA),
     "log": (inspection.LogInspection, inspection.SCHEMA),
-    "optimisation": (optimisation.Optimisation, optimisation.SCHEMA),
+    "optimization": (optimization.Optimization, optimization.SCHEMA),
     "plan": (planning.Plan, planning.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),

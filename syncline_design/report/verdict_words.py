@@ -24,7 +24,7 @@ from syncline_design.verdict.obstacle import obstacle_sentence
 
 if TYPE_CHECKING:
     from syncline_design.verdict.named import NamedRole
-    from syncline_design.verdict.optimisation import Optimisation
+    from syncline_design.verdict.optimization import Optimization
     from syncline_design.verdict.since import Baseline
     from syncline_design.verdict.tree import (
         Caution,
@@ -55,7 +55,7 @@ def outcome(verdict: Checked) -> Outcome:
     return replace(found, word=found.word + qualification(verdict))
 
 
-def qualification(verdict: Verdict | Optimisation) -> str:
+def qualification(verdict: Verdict | Optimization) -> str:
     """What a headline adds to `meets`: warnings that a figure exceeds the limit; else nothing."""
     if verdict.verdict != "meets":
         return ""

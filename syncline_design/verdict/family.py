@@ -162,7 +162,7 @@ def _differing(missions: Sequence[Mission]) -> dict[int, dict[str, Resources]]:
     return out
 
 
-def choose_family(work: Work, method: Road = "auto") -> Chosen | None:
+def choose_family(work: Work, road: Road = "auto") -> Chosen | None:
     """The first design that meets every requirement of every mission; None: there is none.
 
     Where simulation leaves open every design that keeps the sums, the first of those.  A deadline
@@ -170,19 +170,19 @@ def choose_family(work: Work, method: Road = "auto") -> Chosen | None:
     """
     held = in_hand(work.family, passing(work))
     try:
-        return _proven(work, method)
+        return _proven(work, road)
     except OutOfTime:
         if held is None:
             raise
-        proof = held.proof(work.family, method)
+        proof = held.proof(work.family, road)
         designs = work.family.designs(held.found.design)
         return Chosen(designs, work.family.problems, held.found, proof=proof)
 
 
-def _proven(work: Work, method: Road) -> Chosen | None:
+def _proven(work: Work, road: Road) -> Chosen | None:
     left_open: list[FamilyDesign] = []
     problems, passes = work.family.problems, passing(work, left_open)
-    by_sums = choose_by_road(work.family, method)
+    by_sums = choose_by_road(work.family, road)
     one, proof = by_sums.found, by_sums.proof
     if one is None:
         return None

@@ -108,7 +108,7 @@ def judged_family(case: Case, settings: CheckSettings) -> FamilyOutcome:
                 names_candidates(one.case) for one in work.missions
             ):
                 return FamilyOutcome(found, work, pinned)
-        chosen = choose_family(work, settings.method) if pinned is None else None
+        chosen = choose_family(work, settings.road) if pinned is None else None
         if chosen is None:
             return FamilyOutcome(infeasible_family(work, settings, build), work)
         choice = ChoiceResult(proof=chosen.proof)

@@ -42,7 +42,7 @@ def unfinished_verdict(
             for index, one in enumerate(case.spec.requirements)
         ),
         warnings=(Caution("time-limit", f"{why}; no design was found by then"),),
-        choice=ChoiceResult(Proof(settings.method, False, False)),
+        choice=ChoiceResult(Proof(settings.road, False, False)),
     )
 
 

@@ -25,7 +25,7 @@ class Picked:
 
 def pick(
     problem: Problem,
-    method: Road,
+    road: Road,
     verify: Callable[[Design], Verified],
 ) -> Picked:
     """The first design in the documented order that meets every requirement, verified.
@@ -34,7 +34,7 @@ def pick(
     """
     from syncline_design.choice.decide import choose  # 17 ms that a pinned spec need not wait
 
-    choice = choose(problem, method)
+    choice = choose(problem, road)
     if isinstance(choice, Infeasible):
         return Picked(choice, None)
     verified = verify(choice.design)

@@ -25,7 +25,7 @@ class CheckSettings:
     """
 
     seed: int = 0
-    method: Road = "auto"
+    road: Road = "auto"
     monte_carlo: bool = True
     explain: tuple[str, ...] = ()
     today: date | None = None

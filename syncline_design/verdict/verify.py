@@ -96,7 +96,7 @@ def _check_open(case: Case, problem: Problem, settings: CheckSettings, build: Bu
     """Choose, then verify; without any design say why and what would help."""
     picked = pick(
         problem,
-        settings.method,
+        settings.road,
         lambda design: verify(case, problem, design, settings),
     )
     return open_verdict(case, problem, picked, settings, build)

@@ -129,7 +129,7 @@ class Cause(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Difference(Record):
+class Diff(Record):
     """The difference of two specs or verdict files; exit_code: that of the new one."""
 
     schema: Annotated[str, SchemaName(SCHEMA)]
@@ -147,12 +147,12 @@ class Difference(Record):
     admitted: tuple[str, ...] | None = optional()
 
 
-def difference(
+def diff_of(
     files: tuple[str, str], causes: tuple[Cause, ...], found: VerdictChanges, exit_code: int
-) -> Difference:
+) -> Diff:
     """The whole of it from its parts."""
     old, new = files
-    return Difference(
+    return Diff(
         SCHEMA, Compared(old, found.verdict.old), Compared(new, found.verdict.new), causes,
         found.verdict, found.currency, found.payload, found.sums, found.error,
         found.requirements, exit_code, found.outgrown, found.admitted,

@@ -51,7 +51,7 @@ class OptimizeSettings:
     pareto: bool = False
     resource: ResourceName = "cost"
     figure: FigureKind | None = None  # of the error, in place of the Syncline's
-    method: Road = "auto"
+    road: Road = "auto"
     seed: int = 0
     every: bool = False
     report: bool = False  # the whole verdict too, for a page
@@ -72,7 +72,7 @@ class MadeFrom(Record):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Optimisation(Record):
+class Optimization(Record):
     """What `optimize` says: the best designs, or why there is none.
 
     warnings: of the first design, as `check` gives them; cut_short: what the time limit left out
@@ -116,7 +116,7 @@ class Optimisation(Record):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hinged(Optimisation):
+class Hinged(Optimization):
     """Of a design that meets: with what it hinges on, None where that was not worked out."""
 
     slack: tuple[Slack, ...] | None = None
@@ -125,8 +125,8 @@ class Hinged(Optimisation):
 
 
 @dataclass(frozen=True, slots=True)
-class Optimised:
-    """An optimisation with what it was made from.
+class Optimized:
+    """An optimization with what it was made from.
 
     designs, points: of the result, by their places in the problem's tables; verdict: the whole one
     on the same design, where a page is wanted.
@@ -137,7 +137,7 @@ class Optimised:
     settings: OptimizeSettings
     designs: tuple[Design, ...]
     points: tuple[FrontPoint, ...]
-    result: Optimisation
+    result: Optimization
     verdict: Verdict | None = None
     text: str | None = None  # of a family: the spec with its design pinned
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from syncline_design.report.choice_csv import optimisation_csv
+from syncline_design.report.choice_csv import optimization_csv
 from syncline_design.report.document import Document, Heading, Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.report.json_out import json_text
@@ -10,19 +10,19 @@ from syncline_design.report.on_choice import figure_front, hinges_nodes, incompl
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.render_html import html
-from syncline_design.verdict.optimisation import Optimised
+from syncline_design.verdict.optimization import Optimized
 
 
-def render_optimize(name: str, found: Optimised) -> str:
+def render_optimize(name: str, found: Optimized) -> str:
     """The text of one format; html is the design report with all that the choice hinges on."""
     if name == "csv":
-        return optimisation_csv(found)
+        return optimization_csv(found)
     if name == "json":
         return json_text(found.result.to_json())
-    return html(on_optimised(found))
+    return html(on_optimized(found))
 
 
-def on_optimised(found: Optimised) -> Document:
+def on_optimized(found: Optimized) -> Document:
     """The design report with all that the choice hinges on."""
     assert found.verdict is not None
     more: list[Node] = [Text((strong(line),)) for line in incomplete_lines(found.result)]

@@ -46,15 +46,15 @@ from syncline_design.verdict.nearest import nearest
 from syncline_design.verdict.no_design import unfinished_verdict
 from syncline_design.verdict.one_design import verify
 from syncline_design.verdict.open_choice import Picked, pick
-from syncline_design.verdict.optimisation import (
+from syncline_design.verdict.optimization import (
     NO_TABLES,
     Hinged,
     MadeFrom,
-    Optimisation,
-    Optimised,
+    Optimization,
+    Optimized,
     OptimizeSettings,
 )
-from syncline_design.verdict.optimise_family import optimize_family
+from syncline_design.verdict.optimize_family import optimize_family
 from syncline_design.verdict.scenarios import is_family
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Word
@@ -63,7 +63,7 @@ from syncline_design.verdict.verify import open_verdict
 from syncline_design.verdict.why_not import AskedSpec, questions_of, why_not
 
 
-def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
+def optimize(case: Case, settings: OptimizeSettings) -> Optimized:
     """The best designs of a spec; pinned roles stay as they are."""
     if is_family(case):
         return optimize_family(case, settings)
@@ -72,7 +72,7 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
         settings.seed,
-        settings.method,
+        settings.road,
         monte_carlo=simulated or settings.report,
         cloud=settings.report,
     )
@@ -82,7 +82,7 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         in_force().doing("choosing")
         picked = pick(
             problem,
-            settings.method,
+            settings.road,
             lambda design: verify(case, problem, design, checking),
         )
     except OutOfTime as error:
@@ -91,7 +91,7 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     points = _points(case, problem, settings, pieces)
     designs: tuple[Design, ...] = ()
     word = _word(case, problem, picked)
-    kind = Hinged if word == "meets" and picked.exhausted else Optimisation
+    kind = Hinged if word == "meets" and picked.exhausted else Optimization
     result = _begun(kind, case, problem, settings, picked.choice.proof)
     if picked.verified is None:
         result = _with_reasons(result, case, problem, build, pieces)
@@ -113,7 +113,7 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         gave_up=tuple(pieces.gave_up),
     )
     result = _with_front(result, case, problem, settings, points)
-    found = Optimised(case, problem, settings, designs, points, result)
+    found = Optimized(case, problem, settings, designs, points, result)
     if not settings.report:
         return found
     of_error = settings.pareto and settings.resource == "cost" and settings.figure is None
@@ -136,17 +136,17 @@ def _unfinished(
     settings: OptimizeSettings,
     checking: CheckSettings,
     why: str,
-) -> Optimised:
+) -> Optimized:
     """What there is to say when the time limit came before any design."""
     known = None if problem is NO_TABLES else problem
     verdict = unfinished_verdict(case, known, checking, why) if settings.report else None
     result = replace(
-        _begun(Optimisation, case, problem, settings, Proof(settings.method, False, False)),
+        _begun(Optimization, case, problem, settings, Proof(settings.road, False, False)),
         cut_short=("choosing",),
         message=f"No verdict: {why}; no design was found by then.",
     )
     result = _with_front(result, case, problem, settings, ())
-    return Optimised(case, problem, settings, (), (), result, verdict)
+    return Optimized(case, problem, settings, (), (), result, verdict)
 
 
 def _word(case: Case, problem: Problem, picked: Picked) -> Word:
@@ -161,12 +161,12 @@ def _word(case: Case, problem: Problem, picked: Picked) -> Word:
 
 
 def _begun(
-    kind: type[Optimisation],
+    kind: type[Optimization],
     case: Case,
     problem: Problem,
     settings: OptimizeSettings,
     proof: Proof,
-) -> Optimisation:
+) -> Optimization:
     """A result with the parts that every one has, nothing decided yet."""
     excluded, count = ruled_out(problem)
     return kind(
@@ -203,12 +203,12 @@ def _drawn(case: Case, settings: OptimizeSettings) -> str | None:
 
 
 def _with_front(
-    result: Optimisation,
+    result: Optimization,
     case: Case,
     problem: Problem,
     settings: OptimizeSettings,
     points: Sequence[FrontPoint],
-) -> Optimisation:
+) -> Optimization:
     """The result with the parts that `--pareto` asks for."""
     if not settings.pareto:
         return result
@@ -236,8 +236,8 @@ def _designs(
 
 
 def _with_reasons(
-    result: Optimisation, case: Case, problem: Problem, build: Build, pieces: Pieces
-) -> Optimisation:
+    result: Optimization, case: Case, problem: Problem, build: Build, pieces: Pieces
+) -> Optimization:
     """The result with why there is no design."""
     found = explain(case, problem, build)
     if found.cut_short:
@@ -246,8 +246,8 @@ def _with_reasons(
 
 
 def _with_hinges(
-    result: Optimisation, given: tuple[Case, Problem, Design, Build], pieces: Pieces
-) -> Optimisation:
+    result: Optimization, given: tuple[Case, Problem, Design, Build], pieces: Pieces
+) -> Optimization:
     """The result with what it hinges on: slack of every figure, tolerances, what to measure."""
     return replace(
         result,
@@ -258,9 +258,9 @@ def _with_hinges(
 
 
 def _with_others(
-    result: Optimisation, case: Case, problem: Problem, chosen: Design, settings: OptimizeSettings,
+    result: Optimization, case: Case, problem: Problem, chosen: Design, settings: OptimizeSettings,
     points: tuple[FrontPoint, ...], pieces: Pieces,
-) -> Optimisation:  # fmt: skip
+) -> Optimization:  # fmt: skip
     """What if a sensor cannot be had, and what a little more money would buy."""
     if not settings.pareto or settings.resource != "cost":
         nothing: tuple[FrontPoint, ...] = ()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from syncline_design.comparison.difference import (
+from syncline_design.comparison.diff_result import (
     Cause,
-    Difference,
+    Diff,
     FigureChange,
     Pick,
     RequirementChange,
@@ -24,10 +24,10 @@ from syncline_design.report.words import KINDS, OUTCOMES
 from syncline_design.verdict.tree import PREDICATES
 
 
-def render_diff(name: str, data: Difference) -> str:
+def render_diff(name: str, data: Diff) -> str:
     """The text of one format."""
     if name != "github":
-        return rendered(name, data, lambda: on_difference(data))
+        return rendered(name, data, lambda: on_diff(data))
     level = "notice" if data.exit_code == 0 else "error"
     text = visible(" ".join((headline(data), *reasons(data)))).replace("%", "%25")
     file = visible(data.new.file)
@@ -35,13 +35,13 @@ def render_diff(name: str, data: Difference) -> str:
     return f"::{level} file={place},line=1::{text}\n"
 
 
-def on_difference(data: Difference) -> Document:
+def on_diff(data: Diff) -> Document:
     """A difference as a document."""
     lines = tuple(_cause_line(cause) for cause in data.causes)
     causes: list[Node] = [*show(_causes(data), silent=True, reach="page")]
     causes += [Items(lines, reach="text")] if lines else []
     return Document(
-        family="Difference",
+        family="Diff",
         outcome=OUTCOMES[data.verdict.new],
         name=f"{data.old.file} \N{RIGHTWARDS ARROW} {data.new.file}",
         sentences=(headline(data), *reasons(data)),
@@ -58,7 +58,7 @@ def on_difference(data: Difference) -> Document:
     )
 
 
-def headline(data: Difference) -> str:
+def headline(data: Diff) -> str:
     """`stages[uav].distance 100 m to 60 m: payload changes, -26 500 EUR, still meets.`"""
     causes = [cause_words(cause) for cause in data.causes]
     if not causes:
@@ -70,7 +70,7 @@ def headline(data: Difference) -> str:
     return f"{lead}: {effect_words(data)}."
 
 
-def reasons(data: Difference | VerdictChanges) -> tuple[str, ...]:
+def reasons(data: Diff | VerdictChanges) -> tuple[str, ...]:
     """`What was chosen before has TVU-1 at 339.8 mm; the limit is now 320.2 mm.`"""
     rows = {one.id: one for one in data.requirements}
     told = []
@@ -85,7 +85,7 @@ def reasons(data: Difference | VerdictChanges) -> tuple[str, ...]:
     return tuple(told)
 
 
-def effect_words(data: Difference | VerdictChanges) -> str:
+def effect_words(data: Diff | VerdictChanges) -> str:
     """`payload changes, +1 900 EUR, error 12 mm larger, still meets its requirements`."""
     parts = ["payload changes" if data.payload else "same payload"]
     cost, error = data.sums[0], data.error.change
@@ -132,7 +132,7 @@ def pick_words(pick: Pick | None) -> str:
     return f"{pick.name or pick.sensor} ({pick.timestamping}, {pick.primitive})"
 
 
-def _causes(data: Difference) -> Table | None:
+def _causes(data: Diff) -> Table | None:
     rows = [
         (cause_words(cause), "" if cause.effect is None else effect_words(cause.effect))
         for cause in data.causes
@@ -141,19 +141,19 @@ def _causes(data: Difference) -> Table | None:
     return table("What the two files say differently", heads, rows) if rows else None
 
 
-def _payload(data: Difference) -> Table | None:
+def _payload(data: Diff) -> Table | None:
     rows = [(one.role, pick_words(one.old), pick_words(one.new)) for one in data.payload]
     heads = ("Role", "Before", "Now")
     return table("Roles whose sensor or timestamping is another one", heads, rows) if rows else None
 
 
-def _sums(data: Difference) -> Table:
+def _sums(data: Diff) -> Table:
     rows = [_sum_row(figure) for figure in data.sums]
     heads = ("Sum", "Before #", "Now #", "Change #")
     return table("Sums, before and now", heads, [*rows, _error_row(data)])
 
 
-def _error_row(data: Difference) -> tuple[Cell | str, ...]:
+def _error_row(data: Diff) -> tuple[Cell | str, ...]:
     """The Syncline error on either side, in the unit of the tightest limit that it has there."""
     asked = [entry for entry in data.requirements if entry.kind == "accuracy"]
     old, new = (
@@ -175,7 +175,7 @@ def _sum_row(figure: FigureChange) -> tuple[Cell | str, ...]:
     )
 
 
-def _margins(data: Difference) -> Table | None:
+def _margins(data: Diff) -> Table | None:
     rows = [_margin_row(entry) for entry in data.requirements]
     heads = ("Requirement", "Limits", "Before", "Now")
     return table("Requirements, before and now", heads, rows) if rows else None

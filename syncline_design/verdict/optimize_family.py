@@ -38,12 +38,12 @@ from syncline_design.verdict.figure_front import drawn_requirement, figure_words
 from syncline_design.verdict.missions import FamilyOutcome as Judged
 from syncline_design.verdict.missions import judged_family
 from syncline_design.verdict.named import FrontDesign, RankedDesign
-from syncline_design.verdict.optimisation import (
+from syncline_design.verdict.optimization import (
     NO_TABLES,
     Hinged,
     MadeFrom,
-    Optimisation,
-    Optimised,
+    Optimization,
+    Optimized,
     OptimizeSettings,
 )
 from syncline_design.verdict.pinned import pinned_role
@@ -60,14 +60,12 @@ NOT_INTERVALS = Caution(
 )
 
 
-def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
+def optimize_family(case: Case, settings: OptimizeSettings) -> Optimized:
     """The best payloads of a family, with its front where that is asked for."""
     _refuse_unanswered(case, settings)
     _, kinds = questions_of(case, settings.why_not)
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
-    checking = CheckSettings(
-        settings.seed, settings.method, monte_carlo=simulated or settings.report
-    )
+    checking = CheckSettings(settings.seed, settings.road, monte_carlo=simulated or settings.report)
     judged = judged_family(case, checking)
     verdict, work = judged.verdict, judged.work
     if work is None:
@@ -90,7 +88,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     excluded, count = ruled_out_of(work)
     has_design = found is not None and found.found is not None
     hinges = _hinges(work, found, verdict, settings, pieces)
-    kind = Optimisation if hinges is None else Hinged
+    kind = Optimization if hinges is None else Hinged
     result = kind(
         verdict=verdict.verdict,
         spec=SpecName(case.spec.name, str(case.path)),
@@ -118,7 +116,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     text = _pinned_text(work, found) if designs and found is not None else None
     first = work.scenarios[0].problem
     shown = verdict if settings.report else None
-    return Optimised(case, first, settings, (), (), result, shown, text)
+    return Optimized(case, first, settings, (), (), result, shown, text)
 
 
 def _unhinged(case: Case, verdict: Verdict) -> Iterator[Caution]:
@@ -179,12 +177,12 @@ def _provenance(case: Case, settings: OptimizeSettings) -> MadeFrom:
     return MadeFrom(__version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed)
 
 
-def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Optimised:
+def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Optimized:
     """What there is to say when the time limit came before any table."""
-    result = Optimisation(
+    result = Optimization(
         verdict="indeterminate",
         spec=SpecName(case.spec.name, str(case.path)),
-        proof=Proof(settings.method, False, False),
+        proof=Proof(settings.road, False, False),
         combinations=None,
         excluded=(),
         excluded_count=0,
@@ -193,7 +191,7 @@ def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Opt
         message=f"No verdict: {verdict.warnings[0].message}.",
     )
     shown = verdict if settings.report else None
-    return Optimised(case, NO_TABLES, settings, (), (), result, shown)
+    return Optimized(case, NO_TABLES, settings, (), (), result, shown)
 
 
 def _refuse_unanswered(case: Case, settings: OptimizeSettings) -> None:
