@@ -22,6 +22,7 @@ from syncline_design.choice.merged_front import merged_front
 from syncline_design.choice.options import Option, Resources
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.pareto import Columns, undominated
+from syncline_design.choice.parts import is_feasible
 from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
 from tests.plain_front import front_by_enumeration
 
@@ -81,7 +82,9 @@ def test_optimum_equals_enumeration(seed: int) -> None:
     from syncline_design.choice.outcome import Deadline
 
     problem = limited(seed)
-    assert best_by_front(problem, Deadline()) == best_by_enumeration(problem)
+    expected = best_by_enumeration(problem)
+    assert best_by_front(problem, Deadline()) == expected
+    assert is_feasible(problem) is (expected is not None)
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)

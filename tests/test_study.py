@@ -141,6 +141,11 @@ def test_every_case_is_what_the_spec_written_out_gives(result: StudyResult, tmp_
         assert case.verdict == expected["verdict"]
         assert json_of(case.record.design) == expected["design"]
         assert case.record.error_m == (expected["syncline"] or {}).get("total_m")
+        assert json_of(case.record.requirements) == expected["requirements"]
+        assert json_of(case.record.infeasibility) == expected.get("infeasibility")
+        points = (expected.get("choice") or {}).get("front") or ()
+        front = [(point["cost"], point["error_m"]) for point in points]
+        assert [(point.cost, point.error_m) for point in case.record.front] == front
 
 
 def test_heat_map_winners_and_boundaries_follow_from_the_rows(result: StudyResult) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -18,6 +18,7 @@ from syncline_design.choice.outcome import (
     ROAD_NAMES,
     Choice,
     Deadline,
+    FrontPoint,
     Infeasible,
     NoVerdict,
     OutOfTime,
@@ -111,8 +112,7 @@ def _proven(problem: Problem, road: Road, deadline: Deadline) -> Choice | Infeas
 
 def best_by_front(problem: Problem, deadline: Deadline) -> Design | None:
     """The first design by the merge; close calls and ties are settled by best-first search."""
-    resource: ResourceName = "cost" if problem.objective == "error" else problem.objective
-    points = merged_front(problem, resource, accuracy=True, deadline=deadline)
+    points = _merged(problem, deadline)
     if not points:
         return None
     ordered = reversed(points) if problem.objective == "error" else points
@@ -124,6 +124,27 @@ def best_by_front(problem: Problem, deadline: Deadline) -> Design | None:
     except (TooLarge, OutOfTime):  # merging is the proof, the search confirms it
         return picked
     return _agreed(problem, picked, first, "merging", "best-first search")
+
+
+def has_design(problem: Problem, deadline: Deadline) -> bool | None:
+    """Whether the merge finds a design that keeps every sum, simulation apart.
+
+    As sure as the best design: none where nothing is left of the merge, and one that is found is
+    decided exactly.  None where all that is left is as close to a limit as floats cannot tell.
+    """
+    deadline.check()
+    if is_empty(problem):
+        return False
+    points = _merged(problem, deadline)
+    if not points:
+        return False
+    return any(not broken(problem, evaluate(problem, p.design)) for p in points) or None
+
+
+def _merged(problem: Problem, deadline: Deadline) -> Sequence[FrontPoint]:
+    """The front of what is to be least, or of cost, over designs that keep every limit."""
+    resource: ResourceName = "cost" if problem.objective == "error" else problem.objective
+    return merged_front(problem, resource, accuracy=True, deadline=deadline)
 
 
 def _auto(problem: Problem, deadline: Deadline) -> Choice | Infeasible:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 from syncline_design.choice.acceptable import iter_acceptable
+from syncline_design.choice.decide import has_design
 from syncline_design.choice.evaluate import Evaluation, evaluate
 from syncline_design.choice.holding import best_design
 from syncline_design.choice.options import RESOURCES
+from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import Limits, Objective, Problem, with_limits
+from syncline_design.machine.deadline import in_force
 
 KINDS = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
 FIELDS = {"accuracy": "accuracy_m", "sample_spacing": "spacing_m"}  # of Limits, else the kind
@@ -77,7 +81,12 @@ def solve(problem: Problem) -> Evaluation | None:
 
 
 def is_feasible(problem: Problem) -> bool:
-    """Whether any design meets every requirement."""
+    """Whether any design meets every requirement; which is the best of them is not asked."""
+    if problem.judge is None:
+        with suppress(TooLarge):
+            found = has_design(problem, in_force())
+            if found is not None:
+                return found
     return solve(problem) is not None
 
 

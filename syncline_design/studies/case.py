@@ -151,8 +151,9 @@ def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Ca
     left_out = () if simulated else base.simulated
     check = study.check
     wanted = CheckSettings(
-        seed=settings.seed, road=check.method, monte_carlo=simulated, today=settings.today
-    )
+        seed=settings.seed, road=check.method, monte_carlo=simulated, today=settings.today,
+        brief=True,
+    )  # fmt: skip
     with within_s(None if check.time_limit is None else float(check.time_limit)):
         verdict = check_loaded(without_simulated(case) if left_out else case, wanted)
     return _record(verdict, left_out)

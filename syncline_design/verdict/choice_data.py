@@ -42,10 +42,12 @@ def choice_of(
     points: Sequence[FrontPoint] | None = None,
     *,
     pictured: bool = False,
+    brief: bool = False,
 ) -> ChoiceResult:
     """What was chosen among what; points: the front of cost, where it is known.
 
     pictured: whether to tell the front by a figure of the error too, where one is limited.
+    brief: the front, and nothing besides.
     """
     # late: 20 ms that a pinned spec need not wait
     from syncline_design.choice.decide import best
@@ -63,6 +65,8 @@ def choice_of(
 
     if points is None:
         points = pieces.made("front", lambda: tuple(front(problem)), nothing)
+    if brief:
+        return ChoiceResult(picked.choice.proof, front_designs(case, problem, points))
     following = pieces.listed("next best designs", lambda: others(every=False))
     ranked = pieces.listed("next best of every design", lambda: others(every=True))
     excluded, count = ruled_out(problem)

@@ -65,7 +65,7 @@ def infeasible_verdict(
         ),
         warnings=(*((LATE,) if found.cut_short else ()), *implausible_cautions(case)),
         infeasibility=found,
-        nearest=nearest(case, problem, found, build),
+        nearest=None if settings.brief else nearest(case, problem, found, build),
         choice=without_choice(problem),
     )
 

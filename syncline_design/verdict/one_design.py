@@ -72,6 +72,24 @@ def _monte_carlo(
         return None, str(error)
 
 
+def _decided(
+    case: Case,
+    problem: Problem,
+    verified: Verified,
+    settings: CheckSettings,
+    choice: ChoiceResult,
+) -> Verdict:
+    """What decides a verdict, and the design that it is about."""
+    return replace(
+        framed(verified.word, case, problem, settings.seed),
+        requirements=verified.requirements,
+        design=named_design(case, problem, verified.design, verified.figures),
+        syncline=syncline_figures(verified, case.spec.sync_model),
+        monte_carlo=verified.monte_carlo,
+        choice=choice or None,
+    )
+
+
 def verdict_on(
     case: Case,
     problem: Problem,
@@ -80,6 +98,8 @@ def verdict_on(
     choice: ChoiceResult,
 ) -> Verdict:
     """The whole verdict on a verified design."""
+    if settings.brief:
+        return _decided(case, problem, verified, settings, choice)
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
     figures = error_figures(verified, settings.seed, settings.monte_carlo)

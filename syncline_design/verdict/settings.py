@@ -22,6 +22,7 @@ class CheckSettings:
     explain: ids of requirements to work out step by step.
     cloud: whether designs around the front are told too, for a picture.
     today: the day on which waivers are judged; None: the machine's date.
+    brief: what decides, the design and its front alone: no other designs, no warnings, no sources.
     """
 
     seed: int = 0
@@ -30,6 +31,7 @@ class CheckSettings:
     explain: tuple[str, ...] = ()
     today: date | None = None
     cloud: bool = False
+    brief: bool = False
 
 
 def build_of(settings: CheckSettings) -> Build:

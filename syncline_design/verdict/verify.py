@@ -117,7 +117,9 @@ def open_verdict(
     if picked.verified is None:
         return infeasible_verdict(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
-    choice = choice_of(case, problem, picked, pieces, points, pictured=settings.cloud)
+    choice = choice_of(
+        case, problem, picked, pieces, points, pictured=settings.cloud, brief=settings.brief
+    )
     if settings.cloud:
         choice = replace(
             choice, cloud=tuple(pieces.listed("cloud", lambda: cloud(problem, choice.front or ())))
