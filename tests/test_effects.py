@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import re
 import string
 import sys
 from collections.abc import Iterator
@@ -102,6 +103,31 @@ def test_every_file_of_the_folder_is_one_effect_of_its_name() -> None:
     files = {p.stem for p in folder.glob("*.py")} - NOT_EFFECTS - {"__init__"}
     assert files == set(registry())
     assert len(files) == 36  # the rows of the dictionary, a name per row or more
+
+
+def test_the_dictionary_has_a_row_for_every_effect() -> None:
+    """Its name, what it acts on and its parameters, read from the page and from the folder."""
+    root = Path(__file__).parent.parent
+    page = (root / "docs" / "effects.md").read_text("utf-8").partition("## The dictionary")[2]
+    rows = re.findall(r"^\| `(\w+)` \|([^|]*)\|([^|]*)\|([^|]*)\|([^|]*)\|$", page, re.M)
+    assert [name for name, *_ in rows] == sorted(registry()), "python docs/make_effects.py"
+    for name, acts_on, parameters, says, apart in rows:
+        effect = registry()[name]
+        assert re.findall(r"\w+", acts_on) == list(effect.sensors)
+        assert re.findall(r"`(\w+)`", parameters) == [one.name for one in effect.parameters]
+        assert says.strip(), name
+        assert apart.strip() == effect.separated_by.strip()
+
+
+def test_what_a_first_drive_is_asked_for_acts_there() -> None:
+    asked = {one.name: one.commissioned for one in registry().values() if one.commissioned}
+    assert asked == {  # what a surveyor checks first: clocks, antenna, mount, zero of the range
+        "latency": ("position", "attitude"),
+        "lever_arm": ("position",),
+        "boresight": ("ranging",),
+        "range_bias": ("ranging",),
+    }
+    assert all(set(asked[name]) <= set(registry()[name].sensors) for name in asked)
 
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
@@ -292,8 +318,11 @@ def test_no_other_file_names_an_effect() -> None:
         if path.parent.name == "effects":
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Constant) and node.value in registry():
-                named.append((path.name, node.lineno, node.value))
+            said = node.value if isinstance(node, ast.Constant) else None
+            spelt = re.fullmatch(r"(\w+)\([\w.]*\)", said) if isinstance(said, str) else None
+            word = said if spelt is None else spelt[1]  # `latency(position)` names it too
+            if word in registry():
+                named.append((path.name, node.lineno, word))
             module = node.module if isinstance(node, ast.ImportFrom) else None
             if module and module.rpartition(".")[2] in registry():
                 named.append((path.name, node.lineno, module))

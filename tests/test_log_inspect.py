@@ -15,6 +15,7 @@ from syncline_design.cli.app import app
 from syncline_design.logs.inspection import inspect_logs, rate_hz
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
+from syncline_design.spec.log_block import LogChoice
 from tests.flight_logs import START_NS, flight, write_mcap, write_ros1, write_ulog
 from tests.test_diagnose_recordings import spec, tum
 
@@ -63,6 +64,17 @@ def test_the_mapping_says_who_plays_what_and_every_conversion(tmp_path: Path) ->
     for words in ("north, east, down", "quaternions", "degrees", "first fix", "velocities in the"):
         assert words in said
     assert proposal["lacking"] == []
+
+
+def test_the_schema_knows_the_keys_of_the_block(tmp_path: Path) -> None:
+    found = as_json(write_mcap(tmp_path / "a.mcap", MADE))
+    validator = jsonschema.Draft202012Validator(result_schema("log"))
+    for wrong in ({"streams": "/fix"}, {"streams": {"compass": "/mag"}}, {"body": "frf"},
+                  {"gps_week": "2385"}):  # fmt: skip
+        broken = {**found, "proposal": {**found["proposal"], "log": wrong}}
+        assert not validator.is_valid(broken), wrong
+    keys = validator.schema["$defs"]["ProposedBlock"]["properties"]
+    assert set(keys) <= set(LogChoice.model_fields)
 
 
 def test_from_a_bag_to_a_finding_in_two_commands(tmp_path: Path) -> None:

@@ -180,8 +180,8 @@ def test_a_mapping_is_proposed_for_every_file_that_diagnose_can_use(names: tuple
     kind, position, reference = PARTS[names]
     proposal = inspect_logs([DATA / name for name in names]).proposal
     assert (proposal.kind, proposal.lacking) == (kind, ())
-    assert proposal.log["streams"]["position"] == position
-    assert proposal.log["streams"]["reference"] == reference
+    assert proposal.log.streams["position"] == position
+    assert proposal.log.streams["reference"] == reference
     assert proposal.conversions
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args
@@ -102,3 +102,29 @@ def test_a_result_is_read_by_its_own_name_alone(name: ResultName) -> None:
         with pytest.raises(NotThisResultError) as caught:
             read_as(one, json.dumps({"schema": f"{schema}0"}))
         assert f"schema: Input should be '{schema}'" in str(caught.value)
+
+
+def _loose(node: object, path: str = "") -> Iterator[str]:
+    """Where a schema says `object` and nothing of what is in it."""
+    if isinstance(node, list):
+        for k, one in enumerate(node):
+            yield from _loose(one, f"{path}[{k}]")
+    elif isinstance(node, dict):
+        told = {"properties", "$ref", "anyOf", "allOf", "oneOf"} & node.keys()
+        if node.get("type") == "object" and not told and node.get("additionalProperties") in (
+            None, True, {},
+        ):  # fmt: skip
+            yield path
+        for key, one in node.items():
+            yield from _loose(one, f"{path}.{key}")
+
+
+def test_a_loose_object_is_seen() -> None:
+    inner = {"type": "object", "additionalProperties": True}
+    assert list(_loose({"properties": {"a": [inner]}})) == [".properties.a[0]"]
+    assert list(_loose({"type": "object", "additionalProperties": {"type": "number"}})) == []
+
+
+@pytest.mark.parametrize("name", get_args(ResultName))
+def test_every_object_of_a_result_says_what_is_in_it(name: ResultName) -> None:
+    assert list(_loose(result_schema(name))) == []

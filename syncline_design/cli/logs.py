@@ -75,8 +75,9 @@ def _has_attitude(case: Case | None) -> bool:
 def _write(found: LogInspection, case: Case, path: Path) -> None:
     from syncline_design.spec.edit import with_log_text, write_spec
 
-    if not found.proposal.log:
+    block = found.proposal.log.to_json()
+    if not block:
         say("no mapping: no spec written")
         return
-    write_spec(with_log_text(case, found.proposal.log), path)
+    write_spec(with_log_text(case, block), path)
     say(f"spec with the mapping written to {path}")

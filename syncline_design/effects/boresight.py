@@ -52,6 +52,7 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=30,
+    commissioned=("ranging",),
     breaks="mounting",
     asked_in_stretches=True,
     asked_jointly=True,

@@ -58,6 +58,7 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=10,
+    commissioned=("position", "attitude"),
     breaks="latency",
     passing=True,
     comes_with="stamps",

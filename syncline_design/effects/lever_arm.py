@@ -57,6 +57,7 @@ EFFECT = Effect(
     contribute=_contribute,
     transponder=True,
     rarity=20,
+    commissioned=("position",),
     breaks="lever_arm",
     asked_in_stretches=True,
     asked_jointly=True,

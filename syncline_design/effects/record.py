@@ -319,6 +319,7 @@ class Effect:
     those that break one assumption, one a sensor.
     sentence: for people, a format string over {sensor} and the parameters.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
+    commissioned: of which sensors a first drive is asked for it, where nothing else is said.
     implied: no spec lists it; it follows from how often and by what a system measures.
     """
 
@@ -352,6 +353,7 @@ class Effect:
     asked_in_stretches: bool = False
     asked_jointly: bool = False
     brief: tuple[str, ...] = ()
+    commissioned: tuple[ActsOn, ...] = ()
     implied: bool = False
 
     @property

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
 from syncline_design import __version__
 from syncline_design.logs.log import LogKind
 from syncline_design.logs.readers import open_recording
-from syncline_design.logs.readers.epochs import WEEK_SECONDS
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Stream
 from syncline_design.logs.readers.timelines import calendar
 from syncline_design.logs.roles import Offer, Part, Role, Sureness, offers_of, parts_of
@@ -20,7 +19,7 @@ from syncline_design.logs.static_arms import ArmBeside, arms_beside
 from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Json, Record, SchemaName, optional
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.figure_text import to_places
 from syncline_design.spec.edit import flow_text
 from syncline_design.spec.load import BadInput
@@ -117,6 +116,20 @@ class ProposedPart(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class ProposedBlock(Record):
+    """A `log:` block that would read the files so; its keys are the spec's.
+
+    streams: by the role that each plays; the others of streams that do not say so themselves.
+    """
+
+    streams: Mapping[Role, str] | None = optional()
+    timeline: Literal["utc", "gps", "tai", "boot"] | None = optional()
+    gps_week: int | None = optional()
+    frame: Literal["enu", "ned"] | None = optional()
+    body: Literal["flu", "frd"] | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
 class Proposal(Record):
     """The mapping: as a `log:` block, and with reasons.
 
@@ -125,7 +138,7 @@ class Proposal(Record):
     """
 
     kind: LogKind | None
-    log: dict[str, Any]
+    log: ProposedBlock
     block: str
     parts: tuple[ProposedPart, ...]
     conversions: tuple[str, ...]
@@ -270,22 +283,18 @@ def _outside(found: Sequence[Stream]) -> dict[str, tuple[str, ...]]:
 
 def _proposal(offers: Sequence[Offer], choice: LogChoice, poses: bool) -> Proposal:
     if not offers:
-        return Proposal(None, {}, "", (), (), ("no file could be read",))
+        return Proposal(None, ProposedBlock(), "", (), (), ("no file could be read",))
     try:
         parts = parts_of(offers, choice)
     except BadInput as error:
-        return Proposal(None, {}, "", (), (), (str(error),))
+        return Proposal(None, ProposedBlock(), "", (), (), (str(error),))
     lacking, conversions = _tried(offers, choice, poses)
     shown = _used(parts, poses)
     named = {role: part for role, part in shown.items() if role in _NAMED or part.sure == "stated"}
-    block: Json = {"streams": {r: _name(p.offer, offers) for r, p in named.items()}}
-    block |= _axes(shown, choice)
-    if not shown:
-        block = {}
-    kept = choice.model_dump(exclude_none=True, exclude_defaults=True)
-    for key in ("timeline", "gps_week", "frame", "body"):
-        if key in kept:
-            block.setdefault(key, kept[key])
+    block = ProposedBlock(
+        {role: _name(part.offer, offers) for role, part in named.items()} if shown else None,
+        choice.timeline, choice.gps_week, *_axes(shown, choice),
+    )  # fmt: skip
     return Proposal(
         kind=None if lacking else _kind(shown, poses),
         log=block,
@@ -335,21 +344,20 @@ def _name(offer: Offer, offers: Sequence[Offer]) -> str:
     return offer.name if len(same) == 1 else f"{offer.path.name}:{offer.name}"
 
 
-def _axes(parts: dict[Role, Part], choice: LogChoice) -> Json:
-    """Axes that a stream in use does not tell: the assumed ones stand in the block, to be seen."""
-    found: Json = {}
+def _axes(
+    parts: dict[Role, Part], choice: LogChoice
+) -> tuple[Literal["enu", "ned"] | None, Literal["flu", "frd"] | None]:
+    """Frame and body as stated; where a stream in use does not tell, the assumed, to be seen."""
+    frame, body = choice.frame, choice.body
     streams = [part.offer.stream for part in parts.values()]
-    local = ("position_x_m", "quaternion_w", "velocity_x_mps")
-    if any(s.frame == "unknown" and set(local) & set(s.columns) for s in streams):
-        found["frame"] = choice.frame or ASSUMED_FRAME
+    local = {"position_x_m", "quaternion_w", "velocity_x_mps"}
+    if any(s.frame == "unknown" and local & set(s.columns) for s in streams):
+        frame = frame or ASSUMED_FRAME
     if any(s.body == "unknown" and "quaternion_w" in s.columns for s in streams):
-        found["body"] = choice.body or ASSUMED_BODY
-    if choice.gps_week is not None and any(
-        s.stamps is not None and s.stamps.primary == WEEK_SECONDS for s in streams
-    ):
-        found["gps_week"] = choice.gps_week
-    return found
+        body = body or ASSUMED_BODY
+    return frame, body
 
 
-def _text(block: Json) -> str:
-    return f"log: {flow_text(block)}" if block else ""
+def _text(block: ProposedBlock) -> str:
+    keys = block.to_json()
+    return f"log: {flow_text(keys)}" if keys else ""

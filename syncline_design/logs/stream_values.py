@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import field
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -32,8 +32,8 @@ SPEED: Final = tuple(f"velocity_{a}_mps" for a in "xyz")
 BODY_SPEED: Final = tuple(f"velocity_body_{a}_mps" for a in "xyz")
 GLOBE: Final = ("latitude_rad", "longitude_rad")
 ORIGIN: Final = ("origin_latitude_rad", "origin_longitude_rad", "origin_height_msl_m")
-ASSUMED_FRAME: Final[Frame] = "enu"
-ASSUMED_BODY: Final[Body] = "flu"
+ASSUMED_FRAME: Final[Literal["enu"]] = "enu"
+ASSUMED_BODY: Final[Literal["flu"]] = "flu"
 _FRAMES: Final = {"enu": "east, north, up", "ned": "north, east, down", "utm": "UTM"}
 _BODIES: Final = {"flu": "forward, left, up", "frd": "forward, right, down"}
 

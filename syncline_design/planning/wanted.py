@@ -27,10 +27,6 @@ _NAME: Final = re.compile(
 _EXAMPLE: Final = 'such as "latency(position)=1 ms, lever_arm(position)=1 cm"'
 MATERIAL: Final = 0.2  # of the RMS that the noise makes: what an effect has to make to matter
 TOLERANCE: Final = 0.1  # of the same: how well an effect is to be known where nothing is said
-USUAL: Final = (
-    "latency(position)", "latency(attitude)", "lever_arm(position)", "boresight(ranging)",
-    "range_bias(ranging)",
-)  # fmt: skip
 
 
 class PlanError(ValueError):
@@ -242,7 +238,8 @@ def _pair(system: System, every: Sequence[Unknown], pair: EffectPair, matters: A
 
 
 def usual(system: System, every: Sequence[Unknown]) -> PlanWanted:
-    """What a commissioning drive is for where nothing is asked."""
+    """What a commissioning drive is for where nothing is asked; what is met most often first."""
     known = {text_of(system, u) for u in every}
-    chosen = [name for name in USUAL if name in known]
-    return PlanWanted(tuple((named(name, "--reach"), None) for name in chosen))
+    effects = sorted(registry().values(), key=lambda one: (one.rarity, one.name))
+    all_of = (NamedEffect(one.name, sensor) for one in effects for sensor in one.commissioned)
+    return PlanWanted(tuple((one, None) for one in all_of if one.text in known))
