@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from syncline_design.effects.kinematics import rotation_to_euler
 from syncline_design.effects.record import NOTHING, Departures, StageRows
+from syncline_design.machine.random_numbers import generator
 from syncline_design.simulation import kernel
 from syncline_design.simulation.chain import (
     ChainNoise,
@@ -19,7 +20,7 @@ from syncline_design.simulation.chain import (
     screw_displacement,
     stage_error,
 )
-from syncline_design.simulation.draws import RandomSource, generator, stage_draw, timing_draws
+from syncline_design.simulation.draws import RandomSource, stage_draw, timing_draws
 from syncline_design.simulation.surroundings import Moment, placed_rows
 from tests.simulation_systems import DEG, altered, fixed_wing, no_noise, position_only, survey
 

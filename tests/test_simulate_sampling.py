@@ -15,6 +15,7 @@ import pytest
 from scipy import stats
 
 from syncline_design.effects import registry
+from syncline_design.machine.random_numbers import generator
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
@@ -31,7 +32,7 @@ from syncline_design.simulation import (
     worst_cases,
 )
 from syncline_design.simulation.distribution import Binned, ErrorValues, add_counts, no_counts
-from syncline_design.simulation.draws import RandomSource, generator, timing_draw, timing_draws
+from syncline_design.simulation.draws import RandomSource, timing_draw, timing_draws
 from syncline_design.simulation.intervals import proportion_interval
 from syncline_design.simulation.run import look_sizes, quantile_estimates
 from tests.simulation_systems import fixed_wing, position_only, sensor, survey

@@ -12,6 +12,7 @@ import numpy as np
 from syncline_design.choice.options import Bools, Column, Floats, Indices
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.random_numbers import generator
 
 Also = Callable[[int, int], bool] | None
 
@@ -128,7 +129,7 @@ def _exactly_undominated(columns: Columns) -> Indices:
 def _thinned(columns: Columns) -> Indices:
     """Rows left after those that the front of a sample replaces: most, at little cost."""
     count = len(columns)
-    sample = np.unique(np.random.default_rng(0).integers(0, count, SAMPLE))
+    sample = np.unique(generator(0, bits=np.random.PCG64).integers(0, count, SAMPLE))
     best = sample[_exactly_undominated(columns.take(sample))]
     amount = columns.keys[0]
     best = best[np.argsort(amount[best], kind="stable")]

@@ -6,7 +6,6 @@ error is bounded by at that moment; `locked` 1 or 0; `session` a name or number 
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +14,7 @@ from typing import Final
 
 from syncline_design.clocks.files import LogFile, refused
 from syncline_design.clocks.series import FARTHEST_S, Row, Sheet, SourceKind
+from syncline_design.machine.csv_cells import NotCellsError, cells_of
 from syncline_design.machine.deadline import in_force
 
 _UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "\N{MICRO SIGN}s": 1e-6,
@@ -28,7 +28,7 @@ MOST_CELL: Final = 200
 def looks_like(lines: Sequence[str]) -> bool:
     """Whether the first line that is no comment is a header with an offset in it."""
     first = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-    names = [name.strip().lower() for name in next(csv.reader([first], delimiter=_mark(first)), [])]
+    names = [name.strip().lower() for name in cells_of(first, _mark(first))]
     return len(names) > 1 and any(re.match(r"offset|bound", name) for name in names)
 
 
@@ -42,7 +42,7 @@ def read(file: LogFile) -> list[Sheet]:
                 if line.strip() and not line.startswith("#"))  # fmt: skip
     line, header = next(numbered)
     mark = _mark(header)
-    columns = _columns(file, [c.strip() for c in next(csv.reader([header], delimiter=mark))], line)
+    columns = _columns(file, [c.strip() for c in cells_of(header, mark)], line)
     comma = mark != ","
     sheet = Sheet(SourceKind("CSV", "csv", 1, "unknown", "utc"))
     stamps_utc = True
@@ -75,8 +75,8 @@ def _split(
         if not count % 4096:
             check()
         try:
-            yield number, next(csv.reader([line], delimiter=mark))
-        except csv.Error as error:
+            yield number, cells_of(line, mark)
+        except NotCellsError as error:
             raise refused(file.path, f"not a row: {error}", line=number) from None
 
 

@@ -50,6 +50,7 @@ from syncline_design.diagnosis.unlike_readings import (
 from syncline_design.effects.record import Effect
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.random_numbers import generator
 
 TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
@@ -208,7 +209,7 @@ class Search:
 
     def with_episodes(self, model: Model) -> bool:
         """Look for noise that is larger for a while, once; whether the data have it now."""
-        rng = np.random.Generator(np.random.Philox([self.settings.seed, EPISODES]))
+        rng = generator([self.settings.seed, EPISODES])
         wanted = episode_effect().name not in self.settings.exclude_effects
         self.episodes = episodes(self.data, model, rng) if wanted else ()
         if self.episodes:
@@ -415,7 +416,7 @@ def start_search(
 ) -> Search:
     """Candidates and signatures of a log."""
     found = candidates(data.view, settings.exclude_effects)
-    rng = np.random.Generator(np.random.Philox(settings.seed))
+    rng = generator(settings.seed)
     data = replace(data, noisier=noisier_scenes(data.view, rng.spawn(1)[0]))
     shown = signatures(data.view, found)
     return Search(data, settings, rng, found, shown, slow_states(data), progress)

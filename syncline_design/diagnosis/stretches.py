@@ -49,6 +49,7 @@ from syncline_design.diagnosis.stretch_windows import (
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.random_numbers import generator
 from syncline_design.model.normal import NEARLY_ALL
 
 MOST_BLOCKS: Final = 1200  # that windows are made of; of a longer log several rows each
@@ -130,7 +131,7 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -
     asked = [s for s in found if _asked(s)]
     if not asked or len(data.view) < 4 * LEAST_ROWS:
         return Stretches()
-    rng = np.random.Generator(np.random.Philox([seed, STREAM]))
+    rng = generator([seed, STREAM])
     whitened = _whitened(data, clean_errors(data, model, rng, DRAWS), model)
     hits: list[_Hit] = []
     reaches: list[ShownSize] = []

@@ -7,7 +7,6 @@ the last one may be cut off.
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.cells import ISO, NOTHING
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.csv_cells import cells_of
 from syncline_design.machine.quick_dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -162,8 +162,7 @@ def split_names(text: str, separator: str = "") -> tuple[tuple[str, ...], str]:
 
 def split_line(text: str, separator: str) -> list[str]:
     """Cells of one line."""
-    csv.field_size_limit(MOST_LINE)
-    return next(csv.reader([text], delimiter=separator), [])
+    return cells_of(text, separator, MOST_LINE)
 
 
 def _is_row(cells: Sequence[str]) -> bool:

@@ -52,11 +52,6 @@ class RandomSource:
         return np.ascontiguousarray(drawn[:, : self.count])
 
 
-def generator(seed: int, *key: int) -> np.random.Generator:
-    """The Philox stream number `key` of a seed: independent for every key, same for every run."""
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)))
-
-
 def angle(uniform: Array) -> tuple[Array, Array]:
     """(cos, sin) of an angle uniform on the circle, by t = tan(a/2): (1-t^2, 2t) / (1+t^2)."""
     t = np.tan(np.pi * (uniform - 0.5))

@@ -16,9 +16,10 @@ import numpy as np
 from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.random_numbers import generator
 from syncline_design.model.system import System
 from syncline_design.simulation import known_effects
-from syncline_design.simulation.draws import RandomSource, generator, stage_draw, timing_draws
+from syncline_design.simulation.draws import RandomSource, stage_draw, timing_draws
 from syncline_design.simulation.settings import SimulationSettings, demand_simulable
 from syncline_design.simulation.surroundings import moment_draw, tilt_draw
 from syncline_design.simulation.trajectory import trajectory_errors

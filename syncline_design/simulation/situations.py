@@ -14,6 +14,7 @@ import numpy as np
 from syncline_design.effects.acting import by_stage
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.random_numbers import generator
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.roles import ROLES
 from syncline_design.model.syncline import Sigma
@@ -39,7 +40,6 @@ from syncline_design.simulation.drawn_effects import (
 )
 from syncline_design.simulation.draws import (
     TimeShifts,
-    generator,
     lever_arms,
     ranging_shares,
     sight,

@@ -12,7 +12,6 @@ Anything else is the path of a CSV file with the columns of a measured log: `tim
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 from collections.abc import Callable, Mapping
@@ -25,6 +24,7 @@ import numpy as np
 from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import Array, StageRows
+from syncline_design.machine.csv_cells import NotCellsError, rows_of
 from syncline_design.machine.input_files import FileContent, UnsuitableError, read_plain
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
@@ -311,9 +311,9 @@ def _read_columns(file: FileContent) -> dict[str, Array]:
     """All columns of a CSV file as numbers; a cell that is none names its line and column."""
     path = file.path
     try:
-        reader = csv.reader(io.StringIO(file.content.decode("utf-8-sig"), newline=""))
-        rows = [(reader.line_num, row) for row in reader if row]
-    except (UnicodeDecodeError, csv.Error) as failure:
+        lines = io.StringIO(file.content.decode("utf-8-sig"), newline="")
+        rows = [(line, row) for line, row in rows_of(lines) if row]
+    except (UnicodeDecodeError, NotCellsError) as failure:
         raise SimulationError(f"{path}: expected a CSV file in UTF-8: {failure}") from None
     if not rows:
         raise SimulationError(f"{path}: expected a header and rows, found an empty file")

@@ -13,6 +13,7 @@ import numpy as np
 
 from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.record import Array
+from syncline_design.machine.random_numbers import generator
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation import kernel, known_effects
@@ -27,7 +28,7 @@ from syncline_design.simulation.ascent import (
     stacked,
 )
 from syncline_design.simulation.bounds import references
-from syncline_design.simulation.draws import generator, lever_arms, shaped
+from syncline_design.simulation.draws import lever_arms, shaped
 from syncline_design.simulation.results import WorstCase, worst_case
 from syncline_design.simulation.situations import bearings, sights
 from syncline_design.simulation.surroundings import leaning, moment_at

@@ -277,11 +277,10 @@ def sample_values(over: Mapping[str, Any], count: int, seed: int) -> list[tuple[
 
 
 def _shares(key: str, count: int, seed: int) -> list[float]:
-    import numpy as np
+    from syncline_design.machine.random_numbers import generator  # numpy
 
-    stream = np.random.SeedSequence([seed, *key.encode("utf-8", "surrogatepass")])
-    generator = np.random.Generator(np.random.Philox(stream))
-    shares = (generator.permutation(count) + generator.random(count)) / count
+    stream = generator([seed, *key.encode("utf-8", "surrogatepass")])
+    shares = (stream.permutation(count) + stream.random(count)) / count
     return [float(share) for share in shares]
 
 

@@ -24,6 +24,7 @@ from syncline_design.choice.table import Design, Problem, RoleTable
 from syncline_design.choice.variations import sigma_figures
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.random_numbers import generator
 from syncline_design.machine.records import Record
 from syncline_design.simulation.intervals import proportion_interval
 from syncline_design.spec.case import Case
@@ -103,7 +104,7 @@ class Likelihood:
         return {
             figure: np.concatenate(
                 [
-                    np.random.default_rng([self.seed, index, block]).random(FIRST)
+                    generator([self.seed, index, block], bits=np.random.PCG64).random(FIRST)
                     for block in range(first, first + blocks)
                 ]
             )
