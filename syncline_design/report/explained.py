@@ -32,9 +32,16 @@ def explained(verdict: Verdict) -> list[Node]:
 
 def _line(step: ExplainedStep, shown: str = "") -> Inline:
     """`sigma_p_uav = sqrt(0.01**2 + ...) = 17.32 mm: |(s_north, s_east, s_down)|`."""
-    value = shown or numbers.in_unit(step.value, step.unit, 6)
+    value = shown or _value(step)
     put_in = (code(step.numbers), " = ") if step.numbers != repr(step.value) else ()
     return (code(step.name), " = ", *put_in, strong(value), ": ", given(step.formula))
+
+
+def _value(step: ExplainedStep) -> str:
+    """Lengths, times, amounts in their usual units; what else there is in SI, as it is added up."""
+    if not step.unit.startswith(("m/", "m^", "rad")):
+        return numbers.in_unit(step.value, step.unit, 6)
+    return f"{numbers.number(step.value, 6)}\N{NO-BREAK SPACE}{step.unit}"
 
 
 def _sources(one: ExplainedRequirement) -> list[Node]:

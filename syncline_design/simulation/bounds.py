@@ -143,14 +143,14 @@ def longest_lever_m(stage: Stage, first: bool, distance_m: float) -> float:
     if stage.look is None or vectors is None:
         return distance_m + length
     x, y, z = vectors
-    level = math.hypot(x, y) * math.cos(_azimuth_apart(stage.look, math.atan2(y, x)))
+    level = math.hypot(x, y) * math.cos(azimuth_apart(stage.look, math.atan2(y, x)))
     low, high = stage.look.elevation or (-0.5 * math.pi, 0.5 * math.pi)
     best = min(max(math.atan2(-z, level), low), high)
     along = max(level * math.cos(e) - z * math.sin(e) for e in (low, high, best))
     return math.sqrt(max(length**2 + distance_m**2 + 2.0 * distance_m * along, 0.0))
 
 
-def _azimuth_apart(look: Look, azimuth_rad: float) -> float:
+def azimuth_apart(look: Look, azimuth_rad: float) -> float:
     """The least angle [rad] between an azimuth and those that are looked at."""
     if look.azimuth is None:
         return 0.0

@@ -66,7 +66,8 @@ class VarianceShare(Record):
 class StageSituation(Record):
     """One vehicle in a situation; vectors in its body's axes, angles of its attitude.
 
-    distance_m: of its object, where the stage gives several.
+    distance_m: of its object, where the stage gives several; path_bends, turn_bends: unit vectors,
+    which way position and attitude depart between two samples, where they are interpolated.
     """
 
     stage: str
@@ -78,6 +79,8 @@ class StageSituation(Record):
     look: Vector | None = optional()
     position_arm_m: Vector | None = optional()
     distance_m: float | None = optional()
+    path_bends: Vector | None = optional()
+    turn_bends: Vector | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,9 +120,14 @@ def error_statistics(system: System, seed: int) -> Statistics:
 
 def worst_case_m(system: System, sensors: float) -> float:
     """Certified worst case [m] with every sensor at so many standard deviations."""
+    return certified_worst_case_m(with_sensors_at(system, sensors))
+
+
+def with_sensors_at(system: System, sensors: float) -> System:
+    """The system with every sensor's noise at so many standard deviations."""
     stages = tuple(_scaled(stage, sensors) for stage in system.stages)
     effects = tuple(_wider(one, sensors) for one in system.effects)
-    return certified_worst_case_m(replace(system, stages=stages, effects=effects))
+    return replace(system, stages=stages, effects=effects)
 
 
 def _wider(entry: EffectEntry, factor: float) -> EffectEntry:
@@ -163,11 +171,16 @@ def _situation(situations: Situations, name: str, worst: Worst) -> WorstSituatio
     north, east = moment.place_m[:, 0].tolist()
     return WorstSituation(
         figure=f"rmse_m.{name}" if name in AXES else name,
-        stages=tuple(_stage(situations, k, point) for k in range(len(situations.system.stages))),
+        stages=stage_situations(situations, point),
         shares=_shares(situations, worst),
         elapsed_s=float(moment.elapsed_s[0]) if acts else None,
         place_m=(north, east) if acts else None,
     )
+
+
+def stage_situations(situations: Situations, point: Array) -> tuple[StageSituation, ...]:
+    """Every vehicle of a point (p, 1)."""
+    return tuple(_stage(situations, k, point) for k in range(len(situations.system.stages)))
 
 
 def _stage(situations: Situations, index: int, point: Array) -> StageSituation:
@@ -185,6 +198,8 @@ def _stage(situations: Situations, index: int, point: Array) -> StageSituation:
         look=None if stage.ranging is None else _vector(bearings(stage, picked, 1)),
         position_arm_m=None if arm is None else _vector(stage.platform.baseline_m * arm),
         distance_m=float(ranges_m(stage, picked, 1)[0]) if "distance" in picked else None,
+        path_bends=_vector(picked["pull"]) if "pull" in picked else None,
+        turn_bends=_vector(picked["twist"]) if "twist" in picked else None,
     )
 
 

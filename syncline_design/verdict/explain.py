@@ -1,7 +1,7 @@
 """A requirement worked out by hand: each figure as its formula with the numbers put in.
 
-`numbers` is plain arithmetic in SI (+ - * / ** sqrt max abs and brackets) whose value is `value`,
-so that whoever checks can put it into a calculator; a name in it is an earlier step's.
+`numbers` is plain arithmetic in SI (+ - * / ** sqrt sin cos max min abs and brackets) whose value
+is `value`, so that whoever checks can put it into a calculator; a name in it is an earlier step's.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from syncline_design.effects.acting import known_of
-from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model import timing
 from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.pairing import distance_m
@@ -20,27 +19,13 @@ from syncline_design.model.system import UTC, Sensor, Stage, System
 from syncline_design.model.timing import Constant, Empirical, Normal, TimingError, Uniform
 from syncline_design.model.underway import Underway, underway
 from syncline_design.spec.requirement import STATED_KINDS
+from syncline_design.verdict.explain_figures import figure_steps
+from syncline_design.verdict.explain_shared import Worked, apart
 from syncline_design.verdict.named import ExplainedRequirement, ExplainedStep, NamedDesign
-from syncline_design.verdict.tree import ErrorFigures, RequirementResult, Source
+from syncline_design.verdict.tree import RequirementResult
 
 # (relative bound, its rate in numbers, the rate [m/s], the steps before it) of one pair
 Pair = tuple[ExplainedStep, str, float, list[ExplainedStep]]
-
-
-@dataclass(frozen=True, slots=True)
-class Worked:
-    """What an explanation is made from."""
-
-    system: System
-    model: str
-    design: NamedDesign
-    figures: ErrorFigures
-    sources: Sequence[Source]
-
-    def source(self, *entries: str) -> str:
-        """Where the figures of entries come from."""
-        told = {one.entry: one.source for one in self.sources}
-        return "\n".join(f"{entry}: {told[entry]}" for entry in entries if told.get(entry))
 
 
 def explained(
@@ -70,7 +55,7 @@ def _steps(worked: Worked, row: RequirementResult) -> Iterator[ExplainedStep]:
         formula = "largest v_max / rate over the ranging sensors, by sound v_max * 2 d / c"
         yield ExplainedStep(row.id, formula, _n(row.value), row.value, row.unit)
     elif row.kind in STATED_KINDS and row.value is not None:
-        yield from _stated(worked, row)
+        yield from figure_steps(worked, row)
     elif row.value is not None:
         formula = "quantile of |error| over the samples of the simulation"
         yield ExplainedStep(row.id, formula, _n(row.value), row.value, row.unit)
@@ -136,14 +121,7 @@ def _tau(worked: Worked, owner: Stage, sensor: Sensor, role: RoleName) -> Explai
     if extra:
         formula, numbers, value = f"{formula} + effects", f"{numbers} + {_n(extra)}", value + extra
     name = _name(f"tau_{role}", owner)
-    source = worked.source(*_method(worked, owner, role))
-    return ExplainedStep(name, formula, numbers, value, "s", source)
-
-
-def _method(worked: Worked, stage: Stage, role: RoleName) -> tuple[str, ...]:
-    named = next((one for one in worked.design.stages if one.name == stage.name), None)
-    found = None if named is None else named.roles.get(role)
-    return () if found is None else (found.timestamping,)
+    return ExplainedStep(name, formula, numbers, value, "s", worked.stamped(owner, role))
 
 
 def _bound(error: TimingError, k: float) -> tuple[str, str]:
@@ -255,16 +233,16 @@ def _underway(worked: Worked) -> Iterator[ExplainedStep]:
         if one.cause in ("travel", "object"):
             yield replace(_echoed(worked, one), source=source)
             continue
-        apart = ExplainedStep(
-            _name(f"T_{one.role}", stage), *_apart(one), one.interval_s, "s", source
+        waits = ExplainedStep(
+            _name(f"T_{one.role}", stage), *apart(one), one.interval_s, "s", source
         )
-        yield apart
+        yield waits
         if one.cause == "path":
             about = "a_max T^2 / 8"
-            numbers = f"{_n(platform.acceleration_mps2)} * {apart.name}**2 / 8"
+            numbers = f"{_n(platform.acceleration_mps2)} * {waits.name}**2 / 8"
         else:
             about = "alpha_max T^2 / 8 d"
-            numbers = f"{_n(platform.angular_acceleration_radps2)} * {apart.name}**2 / 8 * {_n(d)}"
+            numbers = f"{_n(platform.angular_acceleration_radps2)} * {waits.name}**2 / 8 * {_n(d)}"
         name = _name(f"between_{one.role}", stage)
         yield ExplainedStep(name, about, numbers, one.value_m, "m", source)
 
@@ -282,17 +260,6 @@ def _echoed(worked: Worked, one: Underway) -> ExplainedStep:
     about = f"v_max of {located.name} 2 d / c, while sound goes there and back"
     numbers = f"{_n(located.platform.v_max_mps)} * {echo}"
     return ExplainedStep(_name("travel_object", stage), about, numbers, one.value_m, "m")
-
-
-def _apart(one: Underway) -> tuple[str, str]:
-    """(formula, numbers) of the time between two samples."""
-    rate, sound = one.sensor.rate_hz, one.sensor.sound_mps
-    waits = [] if rate is None else [("1 / rate", f"1 / {_n(rate)}")]
-    if sound is not None:
-        waits.append(("2 d / c", f"2 * {_n(distance_m(one.owner))} / {_n(sound)}"))
-    if len(waits) == 1:
-        return waits[0]
-    return "max(1 / rate, 2 d / c)", f"max({', '.join(numbers for _, numbers in waits)})"
 
 
 def _sync(worked: Worked, pairs: Sequence[Pair]) -> list[ExplainedStep]:
@@ -432,18 +399,3 @@ def _items(design: NamedDesign, kind: str) -> Iterator[tuple[str, str, float | N
         for clock in design.clocks:
             number += 1
             yield f"item_{number}", f"clock of {clock.vehicle}: {clock.name}", clock.cost
-
-
-def _stated(worked: Worked, row: RequirementResult) -> Iterator[ExplainedStep]:
-    """A figure of the error; for the statistical ones what makes the mean square there."""
-    key = {"thu": "thu95_m", "tvu": "tvu95_m", "quantile": "quantile95_3d_m"}.get(
-        row.kind, f"rmse_m.{row.axis or '3d'}"
-    )
-    for one in worked.figures.worst_at or ():
-        if one.figure == key:
-            for number, share in enumerate(one.shares, 1):
-                label = f"share of the mean square: {share.source}"
-                yield ExplainedStep(f"share_{number}", label, _n(share.share), share.share, "1")
-    assert row.value is not None
-    formula = "certified bound" if row.kind == "worst_case" else "largest over the situations"
-    yield ExplainedStep(row.id, formula, _n(row.value), row.value, row.unit)

@@ -27,7 +27,8 @@ from syncline_design.verdict.design_data import (
     transcripts,
     used_entries,
 )
-from syncline_design.verdict.explain import Worked, explained
+from syncline_design.verdict.explain import explained
+from syncline_design.verdict.explain_shared import Worked
 from syncline_design.verdict.held import results as held_results
 from syncline_design.verdict.measured import claim_cautions, measured
 from syncline_design.verdict.named import ChoiceResult
@@ -106,7 +107,8 @@ def verdict_on(
     told = sources(entries)
     bill = bill_of_materials(case, problem, verified.design)
     shown = named_design(case, problem, verified.design, verified.figures)
-    worked = Worked(verified.system, case.spec.sync_model, shown, figures, told)
+    by_id = {one.id: one for one in case.spec.requirements}
+    worked = Worked(verified.system, case.spec.sync_model, shown, told, by_id, settings.seed)
     asked = [row for row in verified.requirements if row.id in settings.explain]
     return replace(
         framed(verified.word, case, problem, settings.seed),

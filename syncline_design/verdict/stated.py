@@ -13,7 +13,7 @@ from syncline_design.model.system import UTC, Sensor, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.figures import worst_case_m
 from syncline_design.simulation.noise_shares import surely_keeps
-from syncline_design.simulation.statistical import Wanted, figure, surely_exceeds
+from syncline_design.simulation.statistical import Wanted, Worst, figure, surely_exceeds
 from syncline_design.spec.requirement import DistanceLimit, Requirement
 
 _GRID, _ZOOMS = 32, 4
@@ -30,12 +30,14 @@ class Certified:
 class Stated:
     """A figure [m] where it is the largest share of its limit [m], and the distance there [m].
 
-    weighted_m: held against the limit at the far end of the last stage's distances.
+    weighted_m: held against the limit at the far end of the last stage's distances; worst: the
+    situation of a statistical one.
     """
 
     value_m: float
     weighted_m: float
     distance_m: float
+    worst: Worst | None = None
 
 
 def wanted_of(requirement: Requirement) -> Wanted | Certified:
@@ -70,7 +72,7 @@ def stated(system: System, wanted: Wanted | Certified, limit_m: float, seed: int
     if isinstance(wanted, Certified):
         return _certified(system, wanted)
     found = figure(system, wanted, limit_m, seed)
-    return Stated(found.value_m, found.weighted_m, found.distance_m)
+    return Stated(found.value_m, found.weighted_m, found.distance_m, found)
 
 
 def value_m(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> float:
@@ -91,7 +93,7 @@ def _certified(system: System, wanted: Certified) -> Stated:
     a, b = wanted.rule
 
     def at(d: float) -> Stated:
-        value = worst_case_m(_moved(system, d), system.coverage_factor)
+        value = worst_case_m(moved(system, d), system.coverage_factor)
         return Stated(value, value * math.hypot(a, b * far) / math.hypot(a, b * d), d)
 
     low, high, best = near, far, at(far)
@@ -103,7 +105,7 @@ def _certified(system: System, wanted: Certified) -> Stated:
     return best
 
 
-def _moved(system: System, distance_m: float) -> System:
+def moved(system: System, distance_m: float) -> System:
     """The system with the last stage's object at a distance."""
     last = system.stages[-1]
     return replace(system, stages=(*system.stages[:-1], at_distance(last, distance_m)))
