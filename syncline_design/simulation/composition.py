@@ -19,12 +19,13 @@ from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import System
 from syncline_design.simulation.ascent import chosen
 from syncline_design.simulation.draws import ranging_shares
-from syncline_design.simulation.figures import StageSituation, Vector, stage_situations
+from syncline_design.simulation.figures import StageSituation, stage_situations
 from syncline_design.simulation.lattice import MANY_POINTS, POINTS
 from syncline_design.simulation.situations import Moments, Situations, bearings, ranges_m
 from syncline_design.simulation.statistical import averaged, columns_at
 from syncline_design.simulation.timing_variables import SystemTiming
 
+Displacement = tuple[float, float, float]  # north, east, down
 _GROWN = 1e-12  # relative: noise that an effect leaves alone
 
 
@@ -43,10 +44,10 @@ class Composition:
     timing: SystemTiming
     mean_m: Array
     covariance_m2: Array
-    displaced: tuple[tuple[str, Vector], ...]
-    scattered: tuple[tuple[str, Vector], ...]
+    displaced: tuple[tuple[str, Displacement], ...]
+    scattered: tuple[tuple[str, Displacement], ...]
     growth: Mapping[tuple[int, RoleName], float]
-    shares: tuple[Vector, ...]
+    shares: tuple[Displacement, ...]
 
 
 def composition(system: System, point: Array) -> Composition:
@@ -80,10 +81,10 @@ def _with(situations: Situations, keep: Callable[[Acting], bool]) -> Situations:
 
 def _displaced(
     situations: Situations, column: Array, listed: list[Acting]
-) -> list[tuple[str, Vector]]:
+) -> list[tuple[str, Displacement]]:
     """What each effect displaces beside those before it, timestamps and draws at their middle."""
     still = situations.steps()[:, :1]
-    found: list[tuple[str, Vector]] = []
+    found: list[tuple[str, Displacement]] = []
     labels = {one.label for one in listed}
 
     def error(allowed: set[tuple[str, str, int]]) -> Array:
@@ -100,7 +101,7 @@ def _displaced(
     return found
 
 
-def _scattered(situations: Situations, column: Array) -> list[tuple[str, Vector]]:
+def _scattered(situations: Situations, column: Array) -> list[tuple[str, Displacement]]:
     """Slopes of what listed effects draw; timestamps and sensors have formulas of their own."""
     _, columns = columns_at(situations, column)
     own = {"noise of ", "timestamp of ", "calibration of ", "drift of ", "clock ", "interpolation"}
@@ -128,7 +129,7 @@ def _growth(
     return found
 
 
-def _shares(situations: Situations, column: Array, index: int) -> Vector:
+def _shares(situations: Situations, column: Array, index: int) -> Displacement:
     """What of sigma the noise of a stage's ranging sensor has at its range and line of sight."""
     stage = situations.system.stages[index]
     if stage.ranging is None:
@@ -153,6 +154,6 @@ def _of(situations: Situations, squares: Array, source: str) -> float:
     )
 
 
-def _vector(values: Array) -> Vector:
+def _vector(values: Array) -> Displacement:
     x, y, z = values.tolist()
     return x, y, z

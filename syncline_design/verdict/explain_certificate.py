@@ -13,6 +13,7 @@ from syncline_design.effects.acting import Acting, known_of, stage_contributions
 from syncline_design.effects.record import Contribution
 from syncline_design.effects.underway import OF_CAUSE
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.lever_arms import arm_difference, position_lever_arm
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.roles import RoleName
@@ -23,7 +24,7 @@ from syncline_design.simulation.bounds import azimuth_apart
 from syncline_design.simulation.figures import with_sensors_at
 from syncline_design.verdict.explain_shared import Worked, apart
 from syncline_design.verdict.explain_sheet import (
-    Sheet,
+    Calculation,
     chord,
     number,
     root_of_squares,
@@ -38,7 +39,7 @@ Value = Callable[[Contribution], float]
 
 def certificate(worked: Worked, system: System, last: str) -> tuple[ExplainedStep, ...]:
     """The certified worst case of a system, whose last stage stands at one distance."""
-    sheet = Sheet()
+    sheet = Calculation()
     sheet.given(
         "k", "coverage_factor: standard deviations of every sensor", system.coverage_factor, "1"
     )
@@ -55,7 +56,7 @@ def certificate(worked: Worked, system: System, last: str) -> tuple[ExplainedSte
 class _At:
     """One stage on the sheet; scaled: the system with its sensors at k standard deviations."""
 
-    sheet: Sheet
+    sheet: Calculation
     worked: Worked
     system: System
     scaled: System
@@ -263,7 +264,7 @@ def _ends(error: TimingError, k: float) -> tuple[tuple[str, str], tuple[str, str
             case Uniform(least, most):
                 words, low, high = "end", number(least), number(most)
             case Normal(middle, std):
-                words = f"mean and {k:g} std"
+                words = f"mean and {to_digits(k)} std"
                 low, high = (
                     f"{number(middle)} {sign} {number(k)} * {number(std)}" for sign in "-+"
                 )

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
 from syncline_design.simulation.composition import Composition, composition
 from syncline_design.simulation.statistical import AXES, Wanted, Worst
 from syncline_design.spec.requirement import DistanceLimit, Requirement
 from syncline_design.verdict.explain_certificate import certificate
 from syncline_design.verdict.explain_shared import Worked
-from syncline_design.verdict.explain_sheet import Sheet, number, total
-from syncline_design.verdict.explain_situation import Vector, moved_by
+from syncline_design.verdict.explain_sheet import Calculation, number, total
+from syncline_design.verdict.explain_situation import AxisLines, moved_by
 from syncline_design.verdict.named import ExplainedStep
 from syncline_design.verdict.stated import Certified, moved, stated, wanted_of
 from syncline_design.verdict.tree import RequirementResult
@@ -63,7 +64,7 @@ def statistical(
     Pearson), c_r = tr C^r + r m' C^(r-1) m, h = c2^3 / c3^2,
     Q^2 = c1 + (chi2 - h) sqrt(c2 / h), chi2 the quantile of h degrees of freedom.
     """
-    sheet, found = Sheet(), composition(system, worst.point)
+    sheet, found = Calculation(), composition(system, worst.point)
     axes = range(3)[AXES[worst.wanted.axis]]
     mean, columns = moved_by(sheet, worked, system, found)
     if worst.wanted.p is None:
@@ -75,7 +76,11 @@ def statistical(
 
 
 def _root_mean_square(
-    sheet: Sheet, moved: tuple[Vector, Sequence[Vector]], axes: range, worst: Worst, last: str
+    sheet: Calculation,
+    moved: tuple[AxisLines, Sequence[AxisLines]],
+    axes: range,
+    worst: Worst,
+    last: str,
 ) -> None:
     mean, columns = moved
     for axis in axes:
@@ -102,12 +107,12 @@ def _cov(one: int, other: int) -> str:
     return f"C_{_NAMES[first][0]}{_NAMES[second][0]}"
 
 
-def _mean_line(sheet: Sheet, mean: Vector, axis: int) -> None:
+def _mean_line(sheet: Calculation, mean: AxisLines, axis: int) -> None:
     sheet.line(_mean(axis), f"mean error {_NAMES[axis]}: what is late on average, and effects",
                mean[axis])  # fmt: skip
 
 
-def _variance(sheet: Sheet, columns: Sequence[Vector], one: int, other: int) -> str:
+def _variance(sheet: Calculation, columns: Sequence[AxisLines], one: int, other: int) -> str:
     """An entry of C: the sum over sources of what each does along both axes."""
     if one == other:
         terms = [f"{column[one]}**2" for column in columns if column[one]]
@@ -120,7 +125,7 @@ def _variance(sheet: Sheet, columns: Sequence[Vector], one: int, other: int) -> 
 
 
 def _three_moments(
-    sheet: Sheet, moved: tuple[Vector, Sequence[Vector]], axes: range
+    sheet: Calculation, moved: tuple[AxisLines, Sequence[AxisLines]], axes: range
 ) -> tuple[str, str, str]:
     """c1, c2, c3 of |P e|^2."""
     mean, columns = moved
@@ -155,7 +160,7 @@ def _cubes(axes: range) -> str:
 
 
 def _quantile(
-    sheet: Sheet, moments: tuple[str, str, str], found: Composition, worst: Worst, last: str
+    sheet: Calculation, moments: tuple[str, str, str], found: Composition, worst: Worst, last: str
 ) -> None:
     c1, c2, c3 = moments
     p, known = worst.wanted.p or 0.0, sheet.known
@@ -163,8 +168,8 @@ def _quantile(
         first = sheet.line("first_order", "length of the mean error", f"sqrt({c1})")
     else:
         h = sheet.line("h", "c2^3 / c3^2, degrees of freedom", f"{c2}**3 / {c3}**2", "1")
-        chi2 = sheet.given("chi2", f"{p:g} quantile of chi-square of h degrees of freedom (table)",
-                           _chi_square(known[h], p), "1")  # fmt: skip
+        about = f"{to_digits(p)} quantile of chi-square of h degrees of freedom (table)"
+        chi2 = sheet.given("chi2", about, _chi_square(known[h], p), "1")
         first = sheet.line("first_order", "sqrt(c1 + (chi2 - h) sqrt(c2 / h))",
                            f"sqrt(max({c1} + ({chi2} - {h}) * sqrt({c2} / {h}), 0.0))")  # fmt: skip
     exactly = _by_table(found, worst.wanted)

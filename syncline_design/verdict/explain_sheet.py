@@ -81,7 +81,7 @@ def worked_out(numbers: str, known: Mapping[str, float]) -> float:
 
 
 @dataclass
-class Sheet:
+class Calculation:
     """Lines in their order, by name; a name that is there already is not written twice."""
 
     steps: dict[str, ExplainedStep] = field(default_factory=dict)

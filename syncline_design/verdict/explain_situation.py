@@ -28,12 +28,12 @@ from syncline_design.model.underway import Underway, underway
 from syncline_design.simulation.composition import Composition
 from syncline_design.simulation.draws import entering
 from syncline_design.simulation.figures import StageSituation
-from syncline_design.simulation.timing_variables import Key, TimingVariable
+from syncline_design.simulation.timing_variables import TimingVariable
 from syncline_design.verdict.explain_shared import Worked, apart
-from syncline_design.verdict.explain_sheet import Sheet, number, suffixes, total
+from syncline_design.verdict.explain_sheet import Calculation, number, suffixes, total
 
-Vector = tuple[str, str, str]  # lines or terms, north, east, down (or x, y, z of the body)
-NOTHING: Vector = ("", "", "")
+AxisLines = tuple[str, str, str]  # lines or terms, north, east, down (or x, y, z of the body)
+NOTHING: AxisLines = ("", "", "")
 _NED, _XYZ = "ned", "xyz"
 _ROTATION: dict[str, str] = {
     "nx": "cos({p}) * cos({y})", "ex": "cos({p}) * sin({y})", "dx": "-sin({p})",
@@ -48,15 +48,15 @@ _MEAN_SHARE, _STD_SHARE = "2 / 3", "sqrt(4 / 45)"
 
 
 def moved_by(
-    sheet: Sheet, worked: Worked, system: System, found: Composition
-) -> tuple[Vector, list[Vector]]:
+    sheet: Calculation, worked: Worked, system: System, found: Composition
+) -> tuple[AxisLines, list[AxisLines]]:
     """(mean error in writing, lines of what one standard deviation of each source does)."""
     stages = [
         _At(sheet, worked, system, found, index, name)
         for index, name in enumerate(suffixes(system))
     ]
-    columns: list[Vector] = []
-    means: list[Vector] = []
+    columns: list[AxisLines] = []
+    means: list[AxisLines] = []
     for at in stages:
         at.place()
         columns += at.noise()
@@ -78,14 +78,14 @@ def moved_by(
     return (north, east, down), columns
 
 
-def _numbers(sheet: Sheet, name: str, about: str, vector: Sequence[float]) -> Vector:
+def _numbers(sheet: Calculation, name: str, about: str, vector: Sequence[float]) -> AxisLines:
     return _each(
         sheet.given(f"{name}_{axis}", f"{about}, {_long(axis)}", value) if value else ""
         for axis, value in zip(_NED, vector, strict=True)
     )
 
 
-def _each(names: Iterator[str]) -> Vector:
+def _each(names: Iterator[str]) -> AxisLines:
     north, east, down = names
     return north, east, down
 
@@ -98,13 +98,13 @@ def _long(axis: str) -> str:
 class _At:
     """One stage on the sheet."""
 
-    sheet: Sheet
+    sheet: Calculation
     worked: Worked
     system: System
     found: Composition
     index: int
     suffix: str
-    lines: dict[str, Vector] = field(default_factory=dict)
+    lines: dict[str, AxisLines] = field(default_factory=dict)
 
     @property
     def stage(self) -> Stage:
@@ -120,14 +120,14 @@ class _At:
     def name(self, what: str) -> str:
         return f"{what}_{self.suffix}"
 
-    def body(self, what: str, formula: str, numbers: Sequence[str], unit: str) -> Vector:
+    def body(self, what: str, formula: str, numbers: Sequence[str], unit: str) -> AxisLines:
         """Three lines in the body's axes."""
         return _each(
             self.line(f"{what}_{axis}", f"{formula}, {axis}", one, unit)
             for axis, one in zip(_XYZ, numbers, strict=True)
         )
 
-    def level(self, what: str, formula: str, vector: Vector, unit: str) -> Vector:
+    def level(self, what: str, formula: str, vector: AxisLines, unit: str) -> AxisLines:
         """R times a vector of the body: three lines north, east, down."""
         return _each(
             self.line(
@@ -166,14 +166,14 @@ class _At:
 
     def _directed(
         self, what: str, limit: str, most: float, vector: Sequence[float], unit: str
-    ) -> Vector:
+    ) -> AxisLines:
         """A vector of the largest length in its direction."""
         size = float(most)
         parts = [one / size if size else 0.0 for one in vector]
         return self.body(what, f"{limit} x direction", [f"{number(size)} * {number(one)}"
                                                         for one in parts], unit)  # fmt: skip
 
-    def _antenna(self) -> Vector:
+    def _antenna(self) -> AxisLines:
         """l_G."""
         given = position_lever_arm(self.stage, self.index == 0)
         if given is None:
@@ -182,7 +182,7 @@ class _At:
             return self.body("l_G", about, [number(one) for one in free], "m")
         return self.body("l_G", "lever arm of the position", [number(one) for one in given], "m")
 
-    def _look(self, w: Vector, arm: Vector) -> None:
+    def _look(self, w: AxisLines, arm: AxisLines) -> None:
         """The line of sight n, the lever q and what a turning vehicle sweeps."""
         here, ranging = self.here, self.stage.ranging
         assert here.look is not None
@@ -200,9 +200,9 @@ class _At:
         self.lines["q"] = self.level("q", "R q", q, "m")
         self.lines["n"] = n
 
-    def noise(self) -> list[Vector]:
+    def noise(self) -> list[AxisLines]:
         """What one standard deviation of each of the stage's sensors does, axis by axis."""
-        found: list[Vector] = []
+        found: list[AxisLines] = []
         stage = self.stage
         if stage.position is not None:
             found += self._position(stage.position)
@@ -226,13 +226,13 @@ class _At:
         unit = _UNITS.get(sensor.role, "rad" if place else "m")
         return self.line(f"s_{what}", formula, numbers, unit, self.worked.of(sensor))
 
-    def _position(self, sensor: Sensor) -> Iterator[Vector]:
+    def _position(self, sensor: Sensor) -> Iterator[AxisLines]:
         for place, axis in enumerate(_NED):
             sigma = self._sigma(sensor, _long(axis), place)
             if sigma:
                 yield _each(sigma if axis == other else "" for other in _NED)
 
-    def _attitude(self, sensor: Sensor) -> Iterator[Vector]:
+    def _attitude(self, sensor: Sensor) -> Iterator[AxisLines]:
         """axis x R q: of roll the body's x, of pitch level and across the heading, of yaw down."""
         q, yaw = self.lines["q"], self.name("yaw")
         x = [self.name(f"R_{axis}x") for axis in _NED]
@@ -247,14 +247,14 @@ class _At:
             if sigma:
                 yield self._times(what, f"{what} noise moves the object", sigma, parts)
 
-    def _times(self, what: str, formula: str, sigma: str, parts: Sequence[str]) -> Vector:
+    def _times(self, what: str, formula: str, sigma: str, parts: Sequence[str]) -> AxisLines:
         return _each(
             self.line(f"by_{what}_{axis}", f"{formula} {_long(axis)}", f"{sigma} * {part}")
             if part else ""
             for axis, part in zip(_NED, parts, strict=True)
         )  # fmt: skip
 
-    def _ranging(self, sensor: Sensor) -> Iterator[Vector]:
+    def _ranging(self, sensor: Sensor) -> Iterator[AxisLines]:
         """R n of the range, d R dn/d(azimuth, elevation) of the bearing."""
         n, d = self.lines["n"], self.name("d")
         here = self.found.shares[self.index]
@@ -276,7 +276,9 @@ class _At:
             yield self._times(what, f"{what} noise moves the object", sigma, parts)
 
 
-Rates = dict[Key, list[tuple[int, str]]]  # of a sensor: (sign, line with {axis} left open)
+Rates = dict[
+    tuple[str, RoleName], list[tuple[int, str]]
+]  # of a sensor: (sign, line with {axis} left open)
 
 
 def _rates(stages: Sequence[_At]) -> Rates:
@@ -299,7 +301,7 @@ def _rates(stages: Sequence[_At]) -> Rates:
     return found
 
 
-def _along(rates: Rates, keys: Sequence[Key], axis: str) -> str:
+def _along(rates: Rates, keys: Sequence[tuple[str, RoleName]], axis: str) -> str:
     """The sum of some sensors' rates along an axis, what cancels left out; "" of nothing."""
     summed: dict[str, int] = {}
     for key in keys:
@@ -315,8 +317,13 @@ def _along(rates: Rates, keys: Sequence[Key], axis: str) -> str:
 
 
 def _stamp(
-    sheet: Sheet, worked: Worked, system: System, place: int, variable: TimingVariable, rates: Rates
-) -> Vector:
+    sheet: Calculation,
+    worked: Worked,
+    system: System,
+    place: int,
+    variable: TimingVariable,
+    rates: Rates,
+) -> AxisLines:
     """What one standard deviation of a timing variable does."""
     source = ""
     if len(variable.moves) == 1:
@@ -341,7 +348,7 @@ def _stamp(
     )  # fmt: skip
 
 
-def _late(sheet: Sheet, worked: Worked, system: System, rates: Rates) -> Iterator[Vector]:
+def _late(sheet: Calculation, worked: Worked, system: System, rates: Rates) -> Iterator[AxisLines]:
     """What sensors that are late or early on average displace."""
     for stage, suffix in zip(system.stages, suffixes(system), strict=True):
         for sensor in entering(stage):
@@ -374,7 +381,7 @@ def _middle(error: TimingError) -> tuple[str, str]:
             return "mean", number(expected(error))
 
 
-def _underway(stages: Sequence[_At], one: Underway) -> tuple[Vector, Vector]:
+def _underway(stages: Sequence[_At], one: Underway) -> tuple[AxisLines, AxisLines]:
     """(mean, one standard deviation) of sound under way or of what is interpolated."""
     at = stages[one.stage]
     if one.cause in ("travel", "object"):
@@ -407,7 +414,7 @@ def _underway(stages: Sequence[_At], one: Underway) -> tuple[Vector, Vector]:
     return mean, column
 
 
-def _echoed(stages: Sequence[_At], one: Underway) -> Vector:
+def _echoed(stages: Sequence[_At], one: Underway) -> AxisLines:
     """What is late by 2 d / c."""
     at = stages[one.stage]
     assert one.sensor.sound_mps is not None
