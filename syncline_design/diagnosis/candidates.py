@@ -9,7 +9,7 @@ import numpy as np
 
 from syncline_design.diagnosis.followed import follows_noise
 from syncline_design.diagnosis.noise import Directed
-from syncline_design.diagnosis.scene import Scene
+from syncline_design.diagnosis.scene import Scene, asked
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import SELDOM, ActsOn, Array, Effect
@@ -19,6 +19,7 @@ from syncline_design.model.system import Stage
 STEP_TIMES = 24  # places along the log where a step is looked for at first
 MEMORIES_S = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # time constants whose shape is looked for as it is
 LEAST_MEMORY = 2.0  # stamps
+STEP = 1e-4  # of a value, by which it is moved for a slope: far below what bends, above rounding
 EDGE = 0.15  # share of the rows at either end where a step is not looked for: it would be a latency
 
 
@@ -185,29 +186,30 @@ def signature(view: Scene, candidate: Candidate, at: dict[str, float]) -> Array:
 
 
 def slopes(view: Scene, acting: Sequence[Acting]) -> Array:
-    """Slope (n, 3, P) of the error by all continuous parameters, by central differences.
+    """Slope (n, 3, P) of the error by all continuous parameters, by differences.
 
     Columns in the order of the effects and their `slopes()`; the sign is that of the error of an
     uncorrected log, so minus the slope of `Scene.error`.
     """
-    asked = tuple(
-        (one.label, one.effect.depart, tuple(sorted(one.values.items()))) for one in acting
-    )
-    return view.slopes.of(asked, lambda: _slopes(view, acting))
+    return view.slopes.of(asked(acting), lambda: _slopes(view, acting))
 
 
 def _slopes(view: Scene, acting: Sequence[Acting]) -> Array:
     columns = []
     for i, one in enumerate(acting):
         for p in one.effect.slopes():
-            step = max(0.1 * p.low, 1e-3 * abs(one.values[p.name]))
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = {**one.values, p.name: one.values[p.name] + sign * step}
-                changed = [*acting]
-                changed[i] = Acting(one.effect, one.sensor, one.stage, moved)
-                ends.append(view.error(changed))
-            columns.append((ends[1] - ends[0]) / (2.0 * step))
+            value = one.values[p.name]
+            step = max(0.1 * p.low, STEP * abs(value))
+
+            def moved(to: float, i: int = i, one: Acting = one, name: str = p.name) -> Array:
+                values = {**one.values, name: to}
+                changed = Acting(one.effect, one.sensor, one.stage, values)
+                return view.error([*acting[:i], changed, *acting[i + 1 :]])
+
+            # no memory reaches below zero: its slope there is that of both sides together
+            both = p.name == one.effect.memory and value < step
+            before = moved(value - step) if both else view.error(acting)
+            columns.append((before - moved(value + step)) / (2.0 * step if both else step))
     if not columns:
         return np.zeros((len(view), 3, 0))
     return np.stack(columns, axis=-1)

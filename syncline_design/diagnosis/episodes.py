@@ -124,6 +124,8 @@ def _in_sensor(
         saved = [np.sum(_saved(left[inside], rest[inside], mine[inside], k)) for k in SIZES]
         factor = float(SIZES[int(np.argmax(saved))])
         first, last = _best_run(_saved(left, rest, mine, factor))
+    if last - first > MOST * len(left) / BLOCKS:
+        return None  # most of the log is the rule, not an episode
     inside = slice(first, last)
     parts = (left[inside], times * (white - own)[inside], times * own[inside])
     gain = float(np.sum(_saved(*parts, factor)))

@@ -36,7 +36,7 @@ STRETCH = 80
 WINDOW = 500
 FIRST_TIMES_S = (None, 3.0, 30.0)
 FAR = 3.0  # standard uncertainties of a step after which slopes are found anew
-LONG, SHORT = 25, 10  # iterations of a noise fit from scratch, and from a good start
+LONG, SHORT = 15, 10  # iterations of a noise fit from scratch, and from a good start
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +157,8 @@ def fit(
     for _ in range(passes):
         known = precision(data.structure, level)
         if now:
-            now, error, _, columns = stepped(data, now, known, error)
+            found = stepped(data, now, known, error)
+            now, error, columns = found.acting, found.error, found.columns
         scatter = (error - known.constant_part(error))[data.noise_rows]
         starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
         fits = [
@@ -165,9 +166,11 @@ def fit(
         ]
         level, _ = min(fits, key=lambda found: found[1])
     factored = precision(data.structure, level)
-    now, error, covariance, _ = stepped(data, now, factored, error, columns=columns)
-    nll = factored.negative_log_likelihood(error)
-    return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
+    found = stepped(data, now, factored, error, columns=columns)
+    nll = factored.likelihood_of(found.squares)
+    return Model(
+        found.acting, tuple(opened), bounds, level, nll, found.covariance, found.error, factored
+    )
 
 
 def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:
@@ -206,7 +209,22 @@ def adjusted(
     data: Data, acting: tuple[Acting, ...], known: Precision, error: Array, steps: int = 3
 ) -> tuple[tuple[Acting, ...], Array, Array]:
     """Parameters of least e' C^-1 e at a known C; (effects, their error, covariance (P, P))."""
-    return stepped(data, acting, known, error, steps)[:3]
+    found = stepped(data, acting, known, error, steps)
+    return found.acting, found.error, found.covariance
+
+
+@dataclass(frozen=True, slots=True)
+class Stepped:
+    """Effects at their best at a known C: the error they leave, and its e' C^-1 e.
+
+    covariance (P, P); columns (n, 3, P): the slopes that it ends with.
+    """
+
+    acting: tuple[Acting, ...]
+    error: Array
+    squares: float
+    covariance: Array
+    columns: Array
 
 
 def stepped(
@@ -216,24 +234,25 @@ def stepped(
     error: Array,
     steps: int = 3,
     columns: Array | None = None,
-) -> tuple[tuple[Acting, ...], Array, Array, Array]:
-    """The same, with the slopes that it ends with; columns: slopes found nearby to start from."""
+) -> Stepped:
+    """The same, with all that was found; columns: slopes found nearby to start from."""
+    squares = _squares(known, error)
     if not acting:
-        return acting, error, np.zeros((0, 0)), np.zeros((*error.shape, 0))
+        return Stepped(acting, error, squares, np.zeros((0, 0)), np.zeros((*error.shape, 0)))
     if columns is None:
         columns = np.nan_to_num(slopes(data.view, acting))
+    weighted = known.solve(columns)
     for _ in range(steps):
-        weighted = known.solve(columns)
         normal, right = inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0]
         change = solve_scaled(normal, right)
-        acting, error, moved = _stepped(data, acting, change, known, error)
+        acting, error, squares, moved = _stepped(data, acting, change, known, (error, squares))
         size2 = moved * moved * float(change @ normal @ change)
         if size2 < 1e-4:
             break
         if size2 > FAR**2:  # the slopes of the old place may not hold in the new one
             columns = np.nan_to_num(slopes(data.view, acting))
             weighted = known.solve(columns)
-    return acting, error, inverse_scaled(inner(columns, weighted)), columns
+    return Stepped(acting, error, squares, inverse_scaled(inner(columns, weighted)), columns)
 
 
 def inner(first: Array, second: Array) -> Array:
@@ -243,16 +262,24 @@ def inner(first: Array, second: Array) -> Array:
 
 
 def _stepped(
-    data: Data, acting: tuple[Acting, ...], change: Array, known: Precision, error: Array
-) -> tuple[tuple[Acting, ...], Array, float]:
-    """The longest of the full step and its halves that lowers the weighted squares."""
-    before = _squares(known, error)
+    data: Data,
+    acting: tuple[Acting, ...],
+    change: Array,
+    known: Precision,
+    before: tuple[Array, float],
+) -> tuple[tuple[Acting, ...], Array, float, float]:
+    """The longest of the full step and its halves that lowers the weighted squares.
+
+    before: the error and its squares.  Effects, error and squares after, and the share.
+    """
+    error, squares = before
     for share in (1.0, 0.5, 0.25, 0.1):
         trial = _moved(acting, share * change)
         left = data.error(trial)
-        if _squares(known, left) <= before:
-            return trial, left, share
-    return acting, error, 0.0
+        fewer = _squares(known, left)
+        if fewer <= squares:
+            return trial, left, fewer, share
+    return acting, error, squares, 0.0
 
 
 def _squares(known: Precision, error: Array) -> float:

@@ -18,6 +18,7 @@ from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
 from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.spans import cut_to, cuttable, span_of
 from syncline_design.diagnosis.trials import plausible, plausible_in_place, with_effect
+from syncline_design.effects import registry
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -48,6 +49,10 @@ class Alias:
     possible: bool = True
     refitted: bool = False
 
+    @property
+    def acts_always(self) -> bool:
+        return not any(p.located for p in self.candidate.effect.parameters)
+
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
@@ -69,7 +74,8 @@ def competed(
     """The model with the best effect in a named one's place, and the rest against that one.
 
     Its class competes, and whatever fits as well to first order: with the other effects of the
-    model fitted again, an effect of quite another signature may be the better one by far.  The
+    model fitted again, an effect of quite another signature may be the better one by far.  So may
+    what always acts where a step is named: the noise has taken up what the step leaves of it.  The
     model has to be fitted.
     """
     span = span_of(effect_of(model, label))
@@ -77,7 +83,10 @@ def competed(
         time_s = data.view.log.time_s
         others = [cut_to(span, s, time_s) for s in others if cuttable(s.candidate.effect)]
     screened, found = _screened(data, model, label, others)
-    near = [a for a in screened if a.cosine > NEAR or a.fit < RIVAL_NATS]
+    placed = any(p.located for p in effect_of(model, label).parameters)
+    like = RIVAL_COSINE if placed else NEAR
+    near = [a for a in screened
+            if a.cosine > (like if a.acts_always else NEAR) or a.fit < RIVAL_NATS]  # fmt: skip
     near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]
     rest = without(model, label)
     fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)
@@ -115,11 +124,23 @@ def _best(
         if score <= scores[least] + AS_GOOD_NATS + charges[one].doubt(charges[least])
     ]  # fmt: skip
 
-    def order(one: Label) -> tuple[bool, int, tuple[int, int], float, Label]:
-        mine = charges[one]
-        return mine.unusual, mine.count, commonness(one), scores[one], one
+    def order(one: Label) -> tuple[bool, int, int, bool, int, float, Label]:
+        mine, (seldom, sensor) = charges[one], commonness(one)
+        unstated = not _is_unstated_arm(data, one)
+        return mine.unusual, mine.count, seldom, unstated, sensor, scores[one], one
 
     return min(close, key=order)
+
+
+def _is_unstated_arm(data: Data, label: Label) -> bool:
+    """Whether it is the arm of a ranging sensor that the spec leaves at zero.
+
+    The reference point may be the antenna by definition; two sensors do not sit in one place.
+    """
+    name, sensor, stage = label
+    rows = data.view.rows[stage]
+    is_arm = name in registry() and registry()[name].breaks == "lever_arm"
+    return is_arm and sensor == "ranging" and not np.any(rows.ranging_m)
 
 
 def _sorted_out(

@@ -200,10 +200,7 @@ def _outstanding(
     scores: Array,
 ) -> Iterator[tuple[float, Wave, float]]:
     """The strongest wave of every reading, where its power is none that neighbours have."""
-    power = np.empty((len(readings), cycles.size))
-    for part in np.array_split(np.arange(cycles.size), max(cycles.size // 500, 1)):
-        turned = np.exp(2j * math.pi * along[:, None] * cycles[part])
-        power[:, part] = np.abs(scores @ turned) ** 2
+    power = _power(cycles, along, scores)
     limit = math.log(power.size / CHANCE)
 
     for own, score, (sensor, stage, k, _) in zip(power, scores, readings, strict=True):
@@ -215,6 +212,19 @@ def _outstanding(
             turned = np.exp(2j * math.pi * along[:, None] * near_it)
             peak = float(near_it[int(np.argmax(np.abs(score @ turned)))])
             yield own[best] / usual, Wave(over, peak, sensor, stage, k), limit
+
+
+def _power(cycles: Array, along: Array, scores: Array) -> Array:
+    """|sum of scores (r, n) times exp(2 pi i c x)|^2 over evenly spaced c, (r, c).
+
+    exp(i (a + b)) = exp(i a) exp(i b): the frequencies of a run differ by the same small ones.
+    """
+    angle = 2j * math.pi * along[:, None]
+    run = max(math.isqrt(cycles.size), 1)
+    fine = np.exp(angle * (cycles[:run] - cycles[0]))
+    sums = [(scores * np.exp(angle[:, 0] * first)) @ fine for first in cycles[::run]]
+    power: Array = np.abs(np.concatenate(sums, axis=1)[:, : cycles.size]) ** 2
+    return power
 
 
 def _in_heading(data: Data, model: Model, left: Array) -> Iterator[tuple[float, Wave, float]]:

@@ -389,43 +389,68 @@ class _Packing:
 
     def slopes(self, level: NoiseLevel, found: Slopes) -> Array:
         """Slopes of the NLL and the prior by the packed logarithms."""
+        factor, slow, sizes = self._by_size(level, found.white, found.column)
+        inside = np.array(level.factor) < FACTOR_LIMIT
+        factor += np.where(inside, np.log(level.factor), 0.0) / FACTOR_SPREAD**2
+        usual = [
+            np.log(t / TIME_USUAL_S) / TIME_SPREAD**2
+            for part, chosen in zip(self.structure.slow, level.time_constant_s, strict=True)
+            for t in (chosen[:1] if part.shared_time else chosen)
+        ]
+        excess, by_time = self._excess_slopes(level)
+        constants = self._of_times(found.time) + usual + by_time
+        return np.concatenate([factor, slow + excess, constants, sizes])
+
+    def steepness(self, level: NoiseLevel, found: Slopes) -> Array:
+        """About how the NLL bends along each packed logarithm: scales that a search is quick in.
+
+        What a part makes up of the error, half of it for a time constant, and the prior's own.
+        """
+        factor, slow, sizes = self._by_size(level, found.expected_white, found.expected_column)
+        inside = np.array(level.factor) < FACTOR_LIMIT
+        times = 0.5 * self._of_times(0.5 * found.expected_column) + TIME_SPREAD**-2
+        return np.concatenate(
+            [np.maximum(factor, 1.0) + inside / FACTOR_SPREAD**2, slow + 1.0, times, sizes + 1.0]
+        )
+
+    def _of_times(self, column: Array) -> Array:
+        """Figures of the slow columns, summed where these share a time constant."""
+        at, found = 0, []
+        for part in self.structure.slow:
+            held = column[at : at + part.columns]
+            at += part.columns
+            found += [float(np.sum(held))] if part.shared_time else held.tolist()
+        return np.array(found)
+
+    def _by_size(
+        self, level: NoiseLevel, white: Array, column: Array
+    ) -> tuple[Array, Array, Array]:
+        """By the logarithms of factors, slow variances and sizes: from the slopes by covariances.
+
+        white (n, 3, 3): by each row's; column (m,): by the logarithm of each column's scale.
+        """
         structure = self.structure
-        column, time = found.column, found.time
         own = np.cumsum([0, *(part.columns for part in structure.slow)])
         factor = np.array(
             [
-                2.0 * f**2 * summed_over(found, w.grown(level).covariance)
+                2.0 * f**2 * summed_over(white, w.grown(level).covariance)
                 if not structure.shared or w.loading is None
                 else 0.0
                 for w, f in zip(structure.white, level.factor, strict=True)
             ]
         )
-        slow, constants = [], []
         for k, part in enumerate(structure.slow):
-            mine = column[own[k] : own[k + 1]]
-            slow += [0.5 * float(value) for value in mine]
-            held = time[own[k] : own[k + 1]]
-            constants += [float(np.sum(held))] if part.shared_time else [float(v) for v in held]
             index = [w.sensor for w in structure.white].index(part.sensor)
             if level.factor[index] > 1.0:
-                factor[index] += float(np.sum(mine))
+                factor[index] += float(np.sum(column[own[k] : own[k + 1]]))
         sizes = self._shared(level, column[own[-1] :], factor)
         if not structure.shared:
             parts = [structure.directed[i].direction for i in self.free_sizes]
             sizes = [
-                2.0 * level.size[i] ** 2 * summed_over(found, d @ np.swapaxes(d, 1, 2))
+                2.0 * level.size[i] ** 2 * summed_over(white, d @ np.swapaxes(d, 1, 2))
                 for i, d in zip(self.free_sizes, parts, strict=True)
             ]
-        inside = np.array(level.factor) < FACTOR_LIMIT
-        factor += np.where(inside, np.log(level.factor), 0.0) / FACTOR_SPREAD**2
-        usual = [
-            np.log(t / TIME_USUAL_S) / TIME_SPREAD**2
-            for part, chosen in zip(structure.slow, level.time_constant_s, strict=True)
-            for t in (chosen[:1] if part.shared_time else chosen)
-        ]
-        excess, by_time = self._excess_slopes(level)
-        constants_by = np.array(constants) + usual + by_time
-        return np.concatenate([factor, np.array(slow) + excess, constants_by, sizes])
+        return factor, 0.5 * column[: own[-1]], np.array(sizes)
 
     def _shared(self, level: NoiseLevel, column: Array, factor: Array) -> list[float]:
         """Slopes by the columns that rows of a stamp share: added to the factors; by the sizes."""
@@ -523,25 +548,30 @@ def fit_noise(
     from scipy.optimize import minimize
 
     packing = _Packing(structure, bounds, free_sizes)
+    first = packing.pack(start)
+    level = packing.unpack(first)
+    found = packing.slopes_at(level, precision(structure, level), error)
+    scale = np.sqrt(packing.steepness(level, found))
+    begun = (first * scale, level, found)
 
-    def cost(vector: Array) -> tuple[float, Array]:
-        level = packing.unpack(vector)
-        try:
-            known = precision(structure, level)
-        except LinAlgError:
-            return 1e15, np.zeros_like(vector)
-        found = packing.slopes_at(level, known, error)
-        total = known.likelihood_of(found.squares) + packing.prior(level)
-        return total, packing.slopes(level, found)
+    def cost(scaled: Array) -> tuple[float, Array]:
+        at, level, found = begun
+        if not np.array_equal(scaled, at):
+            level = packing.unpack(scaled / scale)
+            try:
+                found = packing.slopes_at(level, precision(structure, level), error)
+            except LinAlgError:
+                return 1e15, np.zeros_like(scaled)
+        total = precision(structure, level).likelihood_of(found.squares) + packing.prior(level)
+        return total, packing.slopes(level, found) / scale
 
-    limits = packing.limits()
     result = minimize(
         cost,
-        packing.pack(start),
+        first * scale,
         jac=True,
         method="L-BFGS-B",
-        bounds=limits,
-        options={"maxiter": iterations, "ftol": 5e-6, "gtol": 0.05, "maxls": 10},
+        bounds=np.array(packing.limits()) * scale[:, None],
+        options={"maxiter": iterations, "ftol": 5e-6, "gtol": 0.1, "maxls": 10},
     )
-    level = packing.unpack(result.x)
+    level = packing.unpack(result.x / scale)
     return level, float(result.fun) - packing.prior(level)

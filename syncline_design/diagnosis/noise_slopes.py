@@ -29,13 +29,16 @@ class Slopes:
 
     white (n, 3, 3): to be summed against the slope of each row's white covariance.  column (m,): by
     the logarithm of each column's scale.  time (m,): by the logarithm of each time constant.
-    squares: e' C^-1 e, which is found on the way.
+    squares: e' C^-1 e, which is found on the way.  expected: the same slopes but for what the error
+    itself says, tr(C^-1 dC) / 2, which at the best fit is what a part makes up of the error.
     """
 
     white: Array
     column: Array
     time: Array
     squares: float
+    expected_white: Array
+    expected_column: Array
 
 
 def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Array) -> Slopes:
@@ -47,20 +50,23 @@ def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Arr
         own = weighted[:, :, 0]
         outer = own[:, :, None] * own[:, None, :]
         squares = float(np.sum(error * own))
-        return Slopes(0.5 * (inverse - outer), np.zeros(0), np.zeros(0), squares)
+        none = np.zeros(0)
+        return Slopes(0.5 * (inverse - outer), none, none, squares, 0.5 * inverse, none)
     states = known.states(weighted)[:, :, 0]  # at every row
     left = weighted[:, :, 0] - (inverse @ (loading @ states[:, :, None]))[:, :, 0]
     same, next_same = _blocks(known.factor, m)
     at_rows = same if known.group is None else same[known.group]
     seen = inverse @ loading
-    white = inverse - seen @ at_rows @ np.swapaxes(seen, 1, 2) - left[:, :, None] * left[:, None, :]
+    expected = inverse - seen @ at_rows @ np.swapaxes(seen, 1, 2)
+    white = expected - left[:, :, None] * left[:, None, :]
     inner = np.swapaxes(loading, 1, 2) @ seen
-    column = np.einsum("nab,nba->a", at_rows, inner)
-    column -= np.einsum("ni,nic,nc->c", left, loading, states)
+    made_up = np.einsum("nab,nba->a", at_rows, inner)
+    column = made_up - np.einsum("ni,nic,nc->c", left, loading, states)
     if known.first is not None:
         time_s, states = time_s[known.first], states[known.first]
     times = _times(same, next_same, states, time_s, constants_s)
-    return Slopes(0.5 * white, column, times, float(np.sum(error * left)))
+    squares = float(np.sum(error * left))
+    return Slopes(0.5 * white, column, times, squares, 0.5 * expected, made_up)
 
 
 def _blocks(factor: Array, m: int) -> tuple[Array, Array]:
@@ -133,6 +139,6 @@ def _times(
     return np.where(slow, 0.5 * total, 0.0)
 
 
-def summed_over(slopes: Slopes, covariance: Array) -> float:
-    """<slope, dSigma> for the slope of the white covariance of all rows."""
-    return float(np.sum(slopes.white * covariance))
+def summed_over(white: Array, covariance: Array) -> float:
+    """<slope, dSigma> for the slope by the white covariance of all rows (n, 3, 3)."""
+    return float(np.vdot(white, covariance))

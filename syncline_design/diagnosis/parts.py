@@ -13,12 +13,14 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from syncline_design.diagnosis.candidates import Signature, slopes
 from syncline_design.diagnosis.fitting import Model, fit
 from syncline_design.diagnosis.noise import NoiseLevel, precision
+from syncline_design.diagnosis.positive import inverse as inverse_of
 from syncline_design.diagnosis.slow_states import BLOCKS, INSIDE, LEAST_ROWS, States, fitted_of
 from syncline_design.diagnosis.spans import StampSpan, cut_to, cuttable, span_of
 from syncline_design.effects.acting import Acting
@@ -45,41 +47,68 @@ class FoundPart:
     better: float
 
 
-def best_stretch(states: States, model: Model, column: Array, known: float) -> FoundPart | None:
-    """The stretch in which a column (n, 3, 1) is worth most; `known` of it is taken out already."""
-    if states.count < BLOCKS:
-        return None
+@dataclass(frozen=True, slots=True)
+class BlockSums:
+    """X'X (G, m, m) and X'e (G, m) of every block: free columns, then slow courses with a prior.
+
+    prior (m,): precision, zero of what is free; free: how many those are.
+    """
+
+    normal: Array
+    score: Array
+    prior: Array
+    free: int
+
+    def best(self, column: Array, rest: Array, known: float) -> FoundPart:
+        """The stretch in which a column is worth most; `known` of it is taken out already.
+
+        column (m,): made of these columns; rest: which of them are beside it, in all of the log.
+        """
+        across = self.normal @ column
+        normal = np.concatenate([(across @ column)[:, None], across[:, rest]], axis=1)
+        score = self.score @ column + normal[:, 0] * known
+        beside = np.sum(self.score + known * across, axis=0)[rest]
+        held = np.sum(self.normal, axis=0)[np.ix_(rest, rest)] + np.diag(self.prior[rest])
+        return _best(normal, score, (held, beside))
+
+
+def blocks_of(states: States, model: Model, free: Sequence[Array]) -> BlockSums:
+    """Sums over the blocks of the model's own columns, of others (n, 3, p), and of the courses."""
     own = np.nan_to_num(slopes(states.data.view, model.acting))
-    every = np.concatenate([column, own, states.courses], axis=2)
-    return _best(*states.sums_of(model, every, own.shape[2] + 1), known)
+    every = np.concatenate([own, *free, states.courses], axis=2)
+    width = every.shape[2] - states.courses.shape[2]
+    return BlockSums(*states.sums_of(model, every, width), width)
 
 
-def _best(normal: Array, score: Array, prior: Array, known: float) -> FoundPart:
-    """Of sums by block (G, m, m), (G, m): the first column in stretches, the rest in all."""
-    score = score + normal[:, :, 0] * known
+def _best(normal: Array, score: Array, others: tuple[Array, Array]) -> FoundPart:
+    """Of a column's sums by block with itself and the others (G, m), with the error (G,).
+
+    others: their normal matrix with their prior, and their score.
+    """
     count = normal.shape[0]
-    rest = np.sum(normal[:, 1:, 1:], axis=0) + np.diag(prior)
+    rest, beside = others
     scale = np.sqrt(np.maximum(np.diag(rest), 1e-300))
-    inverse = np.linalg.pinv(rest / scale[:, None] / scale, rcond=1e-12) / scale[:, None] / scale
-    cross = np.concatenate([np.zeros((1, len(prior))), np.cumsum(normal[:, 0, 1:], axis=0)])
-    own = np.concatenate([[0.0], np.cumsum(normal[:, 0, 0])])
-    right = np.concatenate([[0.0], np.cumsum(score[:, 0])])
-    held = inverse @ np.sum(score[:, 1:], axis=0)
+    inverse = inverse_of(rest / scale[:, None] / scale, 1e-12) / scale[:, None] / scale
+    sums = np.concatenate([np.zeros((1, normal.shape[1])), np.cumsum(normal, axis=0)])
+    right = np.concatenate([[0.0], np.cumsum(score)])
+    tried = np.array([(0, count), *_pairs(count)])
+    first, last = tried.T
+    inside = sums[last] - sums[first]
+    across = inside[:, 1:]
+    left = inside[:, 0] - np.sum((across @ inverse) * across, axis=1)
+    told = right[last] - right[first] - across @ (inverse @ beside)
+    seen = left > 1e-7 * max(sums[-1, 0], 1e-300)
+    gains = np.where(seen, 0.5 * told**2 / np.where(seen, left, 1.0), 0.0)
+    best = 1 + int(np.argmax(gains[1:]))
+    better = float(gains[best] - gains[0])
+    return FoundPart(int(first[best]), int(last[best]), float(gains[best]), better)
 
-    def gain(a: int, b: int) -> float:
-        across = cross[b] - cross[a]
-        left = own[b] - own[a] - across @ inverse @ across
-        if not left > 1e-7 * max(own[-1], 1e-300):
-            return 0.0
-        return 0.5 * float(right[b] - right[a] - across @ held) ** 2 / float(left)
 
-    whole = gain(0, count)
-    tried = [
-        FoundPart(a, b, (g := gain(a, b)), g - whole)
-        for a, b in itertools.combinations(range(count + 1), 2)
-        if LEAST <= b - a <= MOST
-    ]
-    return max(tried, key=lambda one: one.gain)
+@cache
+def _pairs(count: int) -> tuple[tuple[int, int], ...]:
+    """Stretches [first, last) of so many blocks."""
+    ends = itertools.combinations(range(count + 1), 2)
+    return tuple((a, b) for a, b in ends if LEAST <= b - a <= MOST)
 
 
 def in_a_part(
@@ -94,13 +123,17 @@ def in_a_part(
     limit: log p that one of the candidates falls below by chance, a stretch being one of many.
     levels: noise to look for its ends in; what is fitted while it is missing has swallowed it.
     """
+    asked = [s for s in free if s.candidate.effect.passing and cuttable(s.candidate.effect)]
+    if states.count < BLOCKS or not asked:
+        return []
     found = []
-    for one in free:
-        if not (one.candidate.effect.passing and cuttable(one.candidate.effect)):
-            continue
-        column = np.nan_to_num(one.columns)
-        best = best_stretch(states, model, column, 0.0)
-        if best is None or best.better < NATS + math.log(STRETCHES):
+    columns = [np.nan_to_num(one.columns) for one in asked]
+    blocks = blocks_of(states, model, columns)
+    size, width = len(blocks.prior), blocks.free - len(asked)
+    rest = np.r_[0:width, blocks.free : size]
+    for k, (one, column) in enumerate(zip(asked, columns, strict=True)):
+        best = blocks.best(np.eye(size)[width + k], rest, 0.0)
+        if best.better < NATS + math.log(STRETCHES):
             continue
         log_p, cut = min(
             (_judged(states, model, one, best, column, level) for level in levels),
@@ -130,20 +163,36 @@ def _judged(
 
 def cut_down(states: States, model: Model) -> Model:
     """The model with every effect that shows no sign of itself outside a stretch cut to that."""
-    for one in model.acting:
+    if states.count < BLOCKS:
+        return model
+    blocks: BlockSums | None = None
+    for label in [a.label for a in model.acting]:
+        one = next(a for a in model.acting if a.label == label)
         if not cuttable(one.effect):
             continue
-        rest = replace(model, acting=tuple(a for a in model.acting if a.label != one.label))
-        values = fitted_of(one)
-        shape = np.nan_to_num(slopes(states.data.view, (one,))) @ values
-        best = best_stretch(states, rest, shape[:, :, None], 1.0)
-        if best is None or best.better < NATS + math.log(STRETCHES):
+        blocks = blocks or blocks_of(states, model, ())
+        best = blocks.best(*_columns_of(model, one, len(blocks.prior)), 1.0)
+        if best.better < NATS + math.log(STRETCHES):
             continue
+        shape = np.nan_to_num(slopes(states.data.view, (one,))) @ fitted_of(one)
         span = _span(states, model, one.effect, shape, best, 1.0)
         trial = _exchanged(states, model, one, span)
         if model.nll - trial.nll > NATS + math.log(STRETCHES) and _alone(states, trial, one, span):
-            model = trial
+            model, blocks = trial, None
     return model
+
+
+def _columns_of(model: Model, one: Acting, count: int) -> tuple[Array, Array]:
+    """One effect's shape made of `count` columns, the model's own first, and which are not its."""
+    at = 0
+    for a in model.acting:
+        width = len(fitted_of(a))
+        if a.label == one.label:
+            break
+        at += width
+    column = np.zeros(count)
+    column[at : at + width] = fitted_of(one)
+    return column, np.delete(np.arange(count), np.s_[at : at + width])
 
 
 def refined(states: States, model: Model) -> Model:

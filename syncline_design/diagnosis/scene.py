@@ -9,7 +9,7 @@ Without departures this is the georeferencing error itself.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import field, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.chain import rotation_exp
 
 SLOPES = 8  # sets of effects whose slopes are kept
+ERRORS = 8  # sets of effects whose error is
 NO_LEVER = (0.0, 0.0, 0.0)
 
 
@@ -43,12 +44,16 @@ class Scene:
     rows: tuple[StageRows, ...]
     known: tuple[Acting, ...]  # the spec's own effects and mean timestamp errors
     slopes: Recent = field(default_factory=lambda: Recent(SLOPES), repr=False, compare=False)
+    errors: Recent = field(default_factory=lambda: Recent(ERRORS), repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.log)
 
     def error(self, acting: Sequence[Acting] = ()) -> Array:
         """Corrected georeferencing error [m], NED, (n, 3); NaN where the truth is not known."""
+        return self.errors.of(asked(acting), lambda: self._error(acting))
+
+    def _error(self, acting: Sequence[Acting]) -> Array:
         error = _corrected_error(self, self._departures(acting))
         return without_unlogged_past(self.system, self.rows, error, (*self.known, *acting))
 
@@ -66,6 +71,13 @@ class Scene:
         motions = tuple(m.at(times) for m in self.motions)
         rows = tuple(cut_rows(r, index) for r in self.rows)
         return Scene(self.system, self.log.rows(index), motions, rows, self.known)
+
+
+def asked(acting: Sequence[Acting]) -> Hashable:
+    """What tells one set of effects at work from another."""
+    return tuple(
+        (one.label, one.effect.depart, tuple(sorted(one.values.items()))) for one in acting
+    )
 
 
 def cut_rows(rows: StageRows, index: Rows) -> StageRows:

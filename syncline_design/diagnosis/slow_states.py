@@ -262,12 +262,12 @@ class States:
         return found
 
     def sums_of(self, model: Model, columns: Array, width: int) -> tuple[Array, Array, Array]:
-        """X'X (G, m, m) and X'e (G, m) of every block, and the prior precision (m - 1,).
+        """X'X (G, m, m) and X'e (G, m) of every block, and the prior precision (m,).
 
-        columns (n, 3, m): one that is judged, `width` in all that are free, then the courses.
+        columns (n, 3, m): `width` that are free, then the courses.
         """
         (sums, *_), prior = self._sums(model.level, model.error, columns, width)
-        return sums.normal, sums.score, np.concatenate([np.zeros(width - 1), prior])
+        return sums.normal, sums.score, np.concatenate([np.zeros(width), prior])
 
     def within(self, inside: NDArray[np.bool_], count: int) -> States:
         """The same with `count` blocks of the rows inside, and one on either side of them."""
@@ -331,16 +331,17 @@ class States:
         q = self.courses.shape[2]
         fixed = np.r_[np.arange(width), np.arange(white.shape[1] - q, white.shape[1])]
         part, weight, scale2 = white[:, fixed], known.ravel().astype(float), 1.0
-        free = part[:, :width]  # what is no slow course
+        more = np.zeros((len(part), 0))  # what else is no slow course
         if self.explained is not None:
-            free = np.column_stack([free, (root @ self.explained[:, axes]).reshape(len(part), -1)])
+            more = (root @ self.explained[:, axes]).reshape(len(part), -1)
+        every = np.column_stack([part, error, more])
         size2 = np.full(len(self.roles), 0.1)
         limit = self._limits(level)
         for _ in range(REWEIGHTED):
-            normal = part.T @ (weight[:, None] * part) / scale2
-            score = part.T @ (weight * error) / scale2
-            if free.shape[1] > width:
-                sized = _beside(free, part[:, width:], weight / scale2, error)
+            total = every.T @ (weight[:, None] * every) / scale2
+            normal, score = total[: width + q, : width + q], total[: width + q, width + q]
+            if more.shape[1]:
+                sized = _beside(total, np.r_[0:width, width + q + 1 : len(total)], width, q)
                 size2 = self._pooled(sized[0], self._sized(*sized, 0, size2, limit))
             else:
                 size2 = self._sized(normal, score, width, size2, limit)
@@ -417,14 +418,19 @@ class States:
         return inverse @ score, inverse
 
 
-def _beside(free: Array, part: Array, weight: Array, error: Array) -> tuple[Array, Array]:
-    """Normal matrix and score of some columns, freed of others that are no slow course."""
-    root = np.sqrt(weight)[:, None]
-    both, taken = root * np.column_stack([part, error]), root * free
-    before = np.sum(both**2, axis=0)
-    both = both - taken @ (inverse_scaled(taken.T @ taken) @ (taken.T @ both))
-    both = both * (np.sum(both**2, axis=0) > LOST * before)
-    return both[:, :-1].T @ both[:, :-1], both[:, :-1].T @ both[:, -1]
+def _beside(total: Array, free: NDArray[np.int64], first: int, count: int) -> tuple[Array, Array]:
+    """Normal matrix and score of the courses, freed of what is no slow course.
+
+    total: X'X of all columns; the courses are `count` from the `first`, then comes the error.
+    """
+    both = np.arange(first, first + count + 1)
+    cross = total[np.ix_(free, both)]
+    left = total[np.ix_(both, both)]
+    before = np.diag(left).copy()
+    left = left - cross.T @ (inverse_scaled(total[np.ix_(free, free)]) @ cross)
+    kept = np.diag(left) > LOST * before
+    left = np.where(kept[:, None] & kept, left, 0.0)
+    return left[:-1, :-1], left[:-1, -1]
 
 
 def _parted(part: NDArray[np.int64], columns: Array, weight: Array, error: Array) -> _Sums:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import field, replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from syncline_design.simulation.chain import rotation_exp
 
 Index = NDArray[np.int64]
 NEAR_S = 5.0  # of a series around the stamps, that their slopes rest on
-SHIFTS = 24  # of the stamps, whose turns and displacements are kept
+SHIFTS = 48  # of the stamps, whose turns and displacements are kept, and what they are made of
 FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
 
 
@@ -55,8 +55,11 @@ class SplinePieces:
 
     def integral(self, from_s: Array, to_s: Array, home_s: Array) -> Array:
         """Integral of the series from from_s to to_s, in the stretch of the home stamp."""
-        stretch = self._stretch(home_s)
-        return self._summed(to_s, stretch) - self._summed(from_s, stretch)
+        return self.summed(to_s, home_s) - self.summed(from_s, home_s)
+
+    def summed(self, at_s: Array, home_s: Array) -> Array:
+        """Integral of the series up to at_s, but for a constant of the home stamp's stretch."""
+        return self._summed(at_s, self._stretch(home_s))
 
     def slope(self, at_s: Array, home_s: Array) -> Array:
         """First derivative of the series."""
@@ -180,8 +183,22 @@ class LoggedMotion:
         start_s, stop_s = from_s - own, to_s - own
         return self.recent.of(
             ("displacement", start_s.tobytes(), stop_s.tobytes()),
-            lambda: self.velocity.integral(start_s, stop_s, self.time_s),
+            lambda: self._passed("velocity", start_s, stop_s),
         )
+
+    def _passed(self, what: Literal["velocity", "rate"], from_s: Array, to_s: Array) -> Array:
+        """Integral of a series between two times of every stamp; one of them was asked before."""
+        series: SplinePieces = getattr(self, what)
+
+        def summed(at_s: Array) -> Array:
+            asked = (what, "summed", at_s.tobytes())
+            return self.recent.of(asked, lambda: series.summed(at_s, self.time_s))
+
+        return summed(to_s) - summed(from_s)
+
+    def _rate(self, at_s: Array) -> Array:
+        asked = ("rate", at_s.tobytes())
+        return self.recent.of(asked, lambda: self.rate.value(at_s, self.time_s))
 
     def turn(self, from_s: Array, to_s: Array) -> Array:
         """Rotation vector theta [rad], R(to) = R(from) exp(S(theta)), (n, 3).
@@ -189,8 +206,8 @@ class LoggedMotion:
         Magnus series to second order: the integral of w plus h^2/12 w(from) x w(to).
         Source: Iserles et al., Lie-group methods, Acta Numerica 9 (2000), sec. 4.
         """
-        first = self.rate.integral(from_s, to_s, self.time_s)
-        start, stop = (self.rate.value(at, self.time_s) for at in (from_s, to_s))
+        first = self._passed("rate", from_s, to_s)
+        start, stop = self._rate(from_s), self._rate(to_s)
         second: Array = ((to_s - from_s) ** 2 / 12.0)[:, None] * np.cross(start, stop)
         return first + second
 
