@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis import Diagnosis, diagnose
-from syncline_design.diagnosis.parts import LEAST, MOST, BlockSums
+from syncline_design.diagnosis.parts import LEAST, MOST, PartSums
 from syncline_design.diagnosis.spans import StampSpan, span_of
 from syncline_design.effects import registry
 from syncline_design.report.on_diagnosis import sentence_text
@@ -92,7 +92,7 @@ def test_the_stretch_that_sums_by_block_say_is_the_best_by_plain_least_squares()
         for b in range(a + LEAST, min(a + MOST, blocks) + 1)
     }
     best = min(tried, key=lambda pair: tried[pair])
-    asked = BlockSums(normal, score, np.array([0.0, *prior]), 2)
+    asked = PartSums(normal, score, np.array([0.0, *prior]), 2)
     found = asked.best(np.array([1.0, 0.0, 0.0, 0.0]), np.arange(1, 4), 0.4)
     assert (found.first, found.last) == best == (5, 9)
     assert found.better == pytest.approx(cost(0, blocks) - tried[best], rel=1e-6)

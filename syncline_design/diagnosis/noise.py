@@ -415,7 +415,8 @@ class _Packing:
 
     def _of_times(self, column: Array) -> Array:
         """Figures of the slow columns, summed where these share a time constant."""
-        at, found = 0, []
+        at = 0
+        found: list[float] = []
         for part in self.structure.slow:
             held = column[at : at + part.columns]
             at += part.columns

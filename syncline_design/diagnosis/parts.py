@@ -48,7 +48,7 @@ class FoundPart:
 
 
 @dataclass(frozen=True, slots=True)
-class BlockSums:
+class PartSums:
     """X'X (G, m, m) and X'e (G, m) of every block: free columns, then slow courses with a prior.
 
     prior (m,): precision, zero of what is free; free: how many those are.
@@ -72,12 +72,12 @@ class BlockSums:
         return _best(normal, score, (held, beside))
 
 
-def blocks_of(states: States, model: Model, free: Sequence[Array]) -> BlockSums:
+def blocks_of(states: States, model: Model, free: Sequence[Array]) -> PartSums:
     """Sums over the blocks of the model's own columns, of others (n, 3, p), and of the courses."""
     own = np.nan_to_num(slopes(states.data.view, model.acting))
     every = np.concatenate([own, *free, states.courses], axis=2)
     width = every.shape[2] - states.courses.shape[2]
-    return BlockSums(*states.sums_of(model, every, width), width)
+    return PartSums(*states.sums_of(model, every, width), width)
 
 
 def _best(normal: Array, score: Array, others: tuple[Array, Array]) -> FoundPart:
@@ -165,7 +165,7 @@ def cut_down(states: States, model: Model) -> Model:
     """The model with every effect that shows no sign of itself outside a stretch cut to that."""
     if states.count < BLOCKS:
         return model
-    blocks: BlockSums | None = None
+    blocks: PartSums | None = None
     for label in [a.label for a in model.acting]:
         one = next(a for a in model.acting if a.label == label)
         if not cuttable(one.effect):
