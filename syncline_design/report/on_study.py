@@ -28,6 +28,7 @@ from syncline_design.report.study_words import (
     rule_sentence,
     winners_table,
 )
+from syncline_design.report.svg import InlineChart
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 from syncline_design.report.words import OUTCOMES
@@ -103,9 +104,12 @@ def _sampled(summary: StudySummary) -> list[Node]:
     found = scatter(summary)
     if found is None:
         return []
-    several = varied(summary)
-    says = [_says(summary.briefs[point.number - 1], several) for point in found.points]
-    draw = partial(charts_study.sampled_cases, found, currency, says)
+
+    def draw() -> InlineChart:
+        several = varied(summary)
+        says = [_says(summary.briefs[point.number - 1], several) for point in found.points]
+        return charts_study.sampled_cases(found, currency, says)
+
     return [Chart("sampled", draw, _sampled_caption(found))]
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
@@ -143,7 +144,7 @@ class FactorError(Exception):
         self.message, self.expected, self.found, self.where = message, expected, found, where
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Factor:
     """One key path and the values it takes, in their order; plain data as a spec would hold."""
 
@@ -152,6 +153,20 @@ class Factor:
     origin: Literal["grid", "sample"]
     place: tuple[str | int, ...]  # where the study file lists them
     listed: bool = True  # each value has its own place in the file
+
+    @cached_property
+    def axis(self) -> tuple[str, ...]:
+        """The labels of the values along an axis: figures by size, all else as listed."""
+        values = list(dict.fromkeys((label(v), figure_of(v)) for v in self.values))
+        kinds = {figure[1] if figure is not None else "" for _, figure in values}
+        if len(kinds) == 1 and "" not in kinds:
+            values.sort(key=lambda item: item[1] or (0.0, ""))
+        return tuple(text for text, _ in values)
+
+    @cached_property
+    def is_of_figures(self) -> bool:
+        """Whether every value is a figure, so that there is something between two of them."""
+        return all(figure_of(value) is not None for value in self.values)
 
 
 @dataclass(frozen=True, slots=True)

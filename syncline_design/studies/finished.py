@@ -79,15 +79,23 @@ class Finished:
         return (self.case(index) for index in range(len(self.keys)))
 
     @cached_property
-    def counts(self) -> dict[CaseWord, int]:
-        """How many cases ended how."""
-        found = Counter(case.verdict for case in self.cases())
-        return {word: found.get(word, 0) for word in VERDICTS}
+    def _ends(self) -> Counter[tuple[CaseWord, tuple[str, ...]]]:
+        """How often cases ended how, with what was not simulated: every record read once."""
+        records = map(self._record, range(len(self.keys)))
+        return Counter((one.verdict, one.not_simulated) for one in records)
 
     @cached_property
+    def counts(self) -> dict[CaseWord, int]:
+        """How many cases ended how."""
+        found = dict.fromkeys(VERDICTS, 0)
+        for (word, _), count in self._ends.items():
+            found[word] += count
+        return found
+
+    @property
     def not_simulated(self) -> tuple[str, ...]:
         """Requirements that no case decided because the study leaves Monte Carlo out."""
-        return tuple(sorted({i for case in self.cases() for i in case.record.not_simulated}))
+        return tuple(sorted({i for _, left_out in self._ends for i in left_out}))
 
     @property
     def verdict(self) -> StudyWord:

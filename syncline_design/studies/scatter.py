@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.yaml_text import plain_scalar
-from syncline_design.studies.definition import Factor, figure_of
-from syncline_design.studies.summary import StudySummary, axis_values, varied
+from syncline_design.studies.definition import Factor
+from syncline_design.studies.summary import StudySummary, varied
 
 MOST_KINDS = 4  # values of a further factor that shapes can tell apart
 LOG_SPAN = 30.0  # an axis whose ends differ by more than this factor is logarithmic
@@ -80,7 +80,7 @@ def _kinds(others: list[tuple[int, Factor]]) -> tuple[str, ...]:
     """The values of the one other factor, where they are few enough to be told apart."""
     if len(others) != 1:
         return ()
-    values = axis_values(others[0][1])
+    values = others[0][1].axis
     return values if len(values) <= MOST_KINDS else ()
 
 
@@ -99,14 +99,14 @@ def _axes(summary: StudySummary) -> tuple[tuple[int, Factor], tuple[int, Factor]
 
 def _unit(factor: Factor) -> tuple[bool, str]:
     """Whether a factor's values are figures of one unit, and that unit."""
-    if any(figure_of(value) is None for value in factor.values):
+    if not factor.is_of_figures:
         return False, ""
-    units = {text.partition(" ")[2].strip() for text in axis_values(factor)}
+    units = {text.partition(" ")[2].strip() for text in factor.axis}
     return len(units) == 1, units.pop()
 
 
 def _axis(factor: Factor) -> ScatterAxis:
-    values = axis_values(factor)
+    values = factor.axis
     figures, unit = _unit(factor)
     if not figures:
         return ScatterAxis(factor.key, words=values)

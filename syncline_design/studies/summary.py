@@ -8,8 +8,7 @@ from typing import Any
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
-from syncline_design.spec.keys import label
-from syncline_design.studies.definition import Factor, figure_of
+from syncline_design.studies.definition import Factor
 from syncline_design.studies.finished import CaseResult, Finished
 from syncline_design.studies.record import CasePoint, CaseWord, RolePick
 
@@ -130,16 +129,7 @@ def _brief(case: CaseResult) -> Brief:
 def varied(summary: StudySummary) -> list[tuple[int, Factor]]:
     """Factors with more than one value, and their place among all factors."""
     factors = summary.result.study.factors
-    return [(i, f) for i, f in enumerate(factors) if len(set(map(label, f.values))) > 1]
-
-
-def axis_values(factor: Factor) -> tuple[str, ...]:
-    """The labels of a factor along an axis: figures by size, all else as listed."""
-    values = list(dict.fromkeys((label(v), figure_of(v)) for v in factor.values))
-    kinds = {figure[1] if figure is not None else "" for _, figure in values}
-    if len(kinds) == 1 and "" not in kinds:
-        values.sort(key=lambda item: item[1] or (0.0, ""))
-    return tuple(text for text, _ in values)
+    return [(i, f) for i, f in enumerate(factors) if len(set(f.axis)) > 1]
 
 
 def heat_map(summary: StudySummary) -> HeatMap | None:
@@ -157,8 +147,8 @@ def heat_map(summary: StudySummary) -> HeatMap | None:
         chosen = [named[study.heat_map.x], named[study.heat_map.y]]
     else:
         several = sorted((f for _, f in varied(summary)), key=lambda f: f.origin != "grid")
-        chosen = [f for f in several if len(axis_values(f)) <= MOST_CELLS][:2]
-    if len(chosen) < 2 or any(len(axis_values(f)) > MOST_CELLS for f in chosen):
+        chosen = [f for f in several if len(f.axis) <= MOST_CELLS][:2]
+    if len(chosen) < 2 or any(len(f.axis) > MOST_CELLS for f in chosen):
         return None
     x, y = chosen
     return _filled(summary, x, y) if _covered(summary, x, y) else None
@@ -169,7 +159,7 @@ def _covered(summary: StudySummary, x: Factor, y: Factor) -> bool:
     factors = summary.result.study.factors
     across, up = factors.index(x), factors.index(y)
     computed = {(brief.labels[across], brief.labels[up]) for brief in summary.briefs}
-    return len(computed) == len(axis_values(x)) * len(axis_values(y))
+    return len(computed) == len(x.axis) * len(y.axis)
 
 
 def _filled(summary: StudySummary, x: Factor, y: Factor) -> HeatMap:
@@ -187,7 +177,7 @@ def _filled(summary: StudySummary, x: Factor, y: Factor) -> HeatMap:
         for brief in summary.briefs
         if brief.verdict == "indeterminate"
     }
-    columns, rows = axis_values(x), axis_values(y)
+    columns, rows = x.axis, y.axis
     found = [[best.get((column, row)) for column in columns] for row in rows]
     return HeatMap(
         x.key, y.key, summary.currencies[0], columns, rows,
@@ -228,10 +218,10 @@ def _winner(
 
 def _extent(factor: Factor, present: set[str]) -> str:
     """`40 m to 80 m`, `everywhere`, or the values one by one."""
-    ordered = [text for text in axis_values(factor) if text in present]
-    if len(ordered) == len(axis_values(factor)):
+    ordered = [text for text in factor.axis if text in present]
+    if len(ordered) == len(factor.axis):
         return "everywhere"
-    if all(figure_of(value) is not None for value in factor.values) and len(ordered) > 2:
+    if factor.is_of_figures and len(ordered) > 2:
         return f"{ordered[0]} to {ordered[-1]}"
     return ", ".join(ordered[:6]) + (", ..." if len(ordered) > 6 else "")
 
@@ -241,14 +231,14 @@ def boundaries(summary: StudySummary) -> list[Boundary]:
     study = summary.result.study
     found: list[Boundary] = []
     for place, factor in varied(summary):
-        if factor.origin != "grid" or any(figure_of(v) is None for v in factor.values):
+        if factor.origin != "grid" or not factor.is_of_figures:
             continue
         lines: dict[Any, dict[str, Brief]] = {}
         for brief in summary.briefs:
             others = brief.labels[:place] + brief.labels[place + 1 :]
             drawn = brief.number % study.samples if study.samples > 1 else 0
             lines.setdefault((brief.base, others, drawn), {})[brief.labels[place]] = brief
-        order = axis_values(factor)
+        order = factor.axis
         for (base, others, _), line in lines.items():
             found += _flips(summary, factor, [line[v] for v in order if v in line], base, others)
     return found
