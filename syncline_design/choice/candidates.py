@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from fractions import Fraction
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 
@@ -254,8 +254,9 @@ class Candidates:
         """A table of these candidates where the stage moves in another way."""
         there, pool = replace(self, motion=motion, made={}), table.anywhere()
         error, added, crit, nearer = (figure[pool.sensor] for figure in there._figures())
-        figures: dict[str, Any] = {"error": error, "added": added, "crit": crit, "nearer": nearer}
-        pool = replace(pool, make=there.__call__, **figures)
+        pool = replace(
+            pool, make=there.__call__, error=error, added=added, crit=crit, nearer=nearer
+        )
         there_now = replace(
             table, distance_m=motion.distance, speed_mps=motion.speed, nearest_m=motion.nearest
         )

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import NamedTuple
 
 from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model import timing
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Look, Platform, Sensor, ShareCurve, Stage, System
@@ -121,6 +122,7 @@ def _sensor(case: Case, stage: StageCase, role: RoleCase, option: Option) -> Sen
     stamping = role.inline or role.method(option.method)
     assert entry is not None
     assert stamping is not None
+    sampled, shares = _sampling(case, stage, role.role, entry), _shapes(stage, entry)
     return Sensor(
         id=option.sensor,
         role=role.role,
@@ -129,22 +131,38 @@ def _sensor(case: Case, stage: StageCase, role: RoleCase, option: Option) -> Sen
         timeline=UTC if option.timeline == "utc" else host_timeline(stage.choice.vehicle_name),
         lever_arm_m=_vector(role.choice.lever_arm),
         type=entry.type,
-        **_apart(case, stage, role.role, entry),
-        **_shapes(stage, entry),
+        rate_hz=sampled.rate_hz,
+        sound_mps=sampled.sound_mps,
+        travels=sampled.travels,
+        range_shape=shares.by_range,
+        range_by_beam=shares.range_by_beam,
+        bearing_by_beam=shares.bearing_by_beam,
     )
 
 
-def _shapes(stage: StageCase, entry: SensorEntry) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class _Shapes:
+    """Noise that depends: on the range, and on the angle of sight."""
+
+    by_range: ShareCurve = ()
+    range_by_beam: ShareCurve = ()
+    bearing_by_beam: ShareCurve = ()
+
+
+def _shapes(stage: StageCase, entry: SensorEntry) -> _Shapes:
     """How noise that depends does so, as shares of the figure where the stage uses it."""
-    found: dict[str, Any] = {}
+    found = _Shapes()
     far = fraction_of(stage.platform.entry.distance)
     for name, table in entry.tables.items():
         if table.of == "range":
             places = (*table.bends(Fraction(0), far), far)
-            found["range_shape"] = _shares(table, places)
+            found = replace(found, by_range=_shares(table, places))
+            continue
+        beam = _shares(table, [place for place, _ in table.rows])
+        if name == "sigma_range":
+            found = replace(found, range_by_beam=beam)
         else:
-            key = "range_by_beam" if name == "sigma_range" else "bearing_by_beam"
-            found[key] = _shares(table, [place for place, _ in table.rows])
+            found = replace(found, bearing_by_beam=beam)
     return found
 
 
@@ -152,7 +170,15 @@ def _shares(table: NoiseTable, places: Sequence[Fraction]) -> ShareCurve:
     return tuple((float(one), float(table.at(one) / table.exact)) for one in places)
 
 
-def _apart(case: Case, stage: StageCase, role: RoleName, entry: SensorEntry) -> dict[str, Any]:
+class _Sampling(NamedTuple):
+    """What between two samples, and while sound is under way, goes on."""
+
+    rate_hz: float | None
+    sound_mps: float | None
+    travels: bool
+
+
+def _sampling(case: Case, stage: StageCase, role: RoleName, entry: SensorEntry) -> _Sampling:
     """How far apart a sensor's samples are and how long its sound is under way, where it matters:
     where the vehicle that they are interpolated for is said to accelerate, or sound is charged."""
     later = case.stages[stage.index + 1 : stage.index + 2]
@@ -164,13 +190,11 @@ def _apart(case: Case, stage: StageCase, role: RoleName, entry: SensorEntry) -> 
     interpolated = any(one is not None for one in told)
     echoes = role == "ranging" and is_acoustic(entry.type)
     travels = echoes and is_charged(entry, case.spec.strict_facts)
-    return {
-        "rate_hz": None if entry.rate is None or not interpolated else float(entry.rate),
-        "sound_mps": float(stage.choice.sound_speed or SOUND_MPS)
-        if echoes and (interpolated or travels)
-        else None,
-        "travels": travels,
-    }
+    rate = None if entry.rate is None or not interpolated else float(entry.rate)
+    waited = echoes and (interpolated or travels)
+    return _Sampling(
+        rate, float(stage.choice.sound_speed or SOUND_MPS) if waited else None, travels
+    )
 
 
 def sigma_of(entry: SensorEntry, role: RoleName) -> Vector:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import field, replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -160,12 +159,10 @@ class _Charges:
 def _noisier(system: System, key: Key) -> System:
     """A system with the noise of one sensor doubled."""
     name, role, _ = key
-    stages = []
-    for stage in system.stages:
-        louder: dict[str, Any] = (
-            {role: _doubled(getattr(stage, role))} if stage.name == name else {}
-        )
-        stages.append(replace(stage, **louder))
+    stages = (
+        one.with_sensor(role, _doubled(getattr(one, role))) if one.name == name else one
+        for one in system.stages
+    )
     return replace(system, stages=tuple(stages))
 
 

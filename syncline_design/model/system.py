@@ -5,7 +5,7 @@ This is what the Syncline, the simulator, the effects and the diagnosis all take
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.known import EffectEntry
@@ -94,6 +94,16 @@ class Stage:
     ranging: Sensor | None
     transponder_lever_arm_m: tuple[float, float, float] | None = None
     look: Look | None = None
+
+    def with_sensor(self, role: RoleName, sensor: Sensor | None) -> Stage:
+        """The stage with another sensor in a role."""
+        match role:
+            case "position":
+                return replace(self, position=sensor)
+            case "attitude":
+                return replace(self, attitude=sensor)
+            case "ranging":
+                return replace(self, ranging=sensor)
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Sensors the stage has, in the order position, attitude, ranging."""

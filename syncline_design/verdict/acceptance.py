@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import field, replace
 from datetime import date
 from fractions import Fraction
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from syncline_design.choice.candidates import may_be_underway
 from syncline_design.choice.chosen_system import system_of
@@ -347,8 +347,7 @@ def _grown(system: System, stage: int, role: RoleName, noise: float, shift: floa
         timing=_stretched(sensor.timing, shift),
     )
     stages = list(system.stages)
-    changed: dict[str, Any] = {role: sensor}
-    stages[stage] = replace(own, **changed)
+    stages[stage] = own.with_sensor(role, sensor)
     return replace(system, stages=tuple(stages))
 
 

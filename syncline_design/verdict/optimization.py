@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Annotated
 
 from syncline_design.choice.options import ResourceName
@@ -122,6 +123,23 @@ class Hinged(Optimization):
     slack: tuple[Slack, ...] | None = None
     tolerances: ToleranceVerdict | None = None
     measure_next: tuple[Measurement, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Hinges:
+    """What a design hinges on; None: not worked out."""
+
+    slack: tuple[Slack, ...] | None
+    tolerances: ToleranceVerdict | None
+    measure_next: tuple[Measurement, ...] | None
+
+
+def with_hinges(result: Optimization, hinges: Hinges | None) -> Optimization:
+    """A result with what its design hinges on, where it is one of a design that meets."""
+    if hinges is None:
+        return result
+    told = {one.name: getattr(result, one.name) for one in fields(result)}
+    return Hinged(**(told | {one.name: getattr(hinges, one.name) for one in fields(hinges)}))
 
 
 @dataclass(frozen=True, slots=True)

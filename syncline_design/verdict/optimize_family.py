@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.front import staircase
@@ -40,11 +39,12 @@ from syncline_design.verdict.missions import judged_family
 from syncline_design.verdict.named import FrontDesign, RankedDesign
 from syncline_design.verdict.optimization import (
     NO_TABLES,
-    Hinged,
+    Hinges,
     MadeFrom,
     Optimization,
     Optimized,
     OptimizeSettings,
+    with_hinges,
 )
 from syncline_design.verdict.pinned import pinned_role
 from syncline_design.verdict.settings import CheckSettings
@@ -88,8 +88,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimized:
     excluded, count = ruled_out_of(work)
     has_design = found is not None and found.found is not None
     hinges = _hinges(work, found, verdict, settings, pieces)
-    kind = Optimization if hinges is None else Hinged
-    result = kind(
+    result = Optimization(
         verdict=verdict.verdict,
         spec=SpecName(case.spec.name, str(case.path)),
         proof=MERGED if found is None else found.proof,
@@ -111,8 +110,8 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimized:
         front_left_out=front and front_left_out(work, settings.resource),
         staircase=front and front[1],
         why_not=answers,
-        **(hinges or {}),
     )
+    result = with_hinges(result, hinges)
     text = _pinned_text(work, found) if designs and found is not None else None
     first = work.scenarios[0].problem
     shown = verdict if settings.report else None
@@ -131,7 +130,7 @@ def _unhinged(case: Case, verdict: Verdict) -> Iterator[Caution]:
 
 def _hinges(
     work: Work, found: Chosen | None, verdict: Verdict, settings: OptimizeSettings, pieces: Pieces
-) -> dict[str, Any] | None:
+) -> Hinges | None:
     """Slack of every figure, tolerances and what to measure, as far as time goes."""
     if verdict.verdict != "meets" or found is None or found.found is None:
         return None
@@ -148,13 +147,11 @@ def _hinges(
         )
     ]
     rows: tuple[Slack, ...] | None = None
-    return {
-        "slack": pieces.made("slack ledger", lambda: tuple(family_slack(work, found, build)), rows),
-        "tolerances": pieces.made("tolerances", lambda: tolerance_over(parts), None),
-        "measure_next": pieces.made(
-            "what to measure next", lambda: measure_next(work, found, build), None
-        ),
-    }
+    return Hinges(
+        pieces.made("slack ledger", lambda: tuple(family_slack(work, found, build)), rows),
+        pieces.made("tolerances", lambda: tolerance_over(parts), None),
+        pieces.made("what to measure next", lambda: measure_next(work, found, build), None),
+    )
 
 
 def _with_sums(judged: Judged, pieces: Pieces) -> Chosen | None:
