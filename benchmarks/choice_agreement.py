@@ -33,7 +33,7 @@ from syncline_design.choice.enumerate import all_designs
 from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
 from syncline_design.choice.front import front
 from syncline_design.choice.milp import best_by_milp
-from syncline_design.choice.options import Option
+from syncline_design.choice.option import Option
 from syncline_design.choice.outcome import Deadline, FrontPoint, NoVerdict
 from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import ClockOption, Design, Pair, Problem, with_limits

@@ -8,7 +8,7 @@ import random
 from fractions import Fraction
 from pathlib import Path
 
-from syncline_design.choice.options import Option, Resources
+from syncline_design.choice.option import Option, Resources
 from syncline_design.choice.table import (
     NO_CLOCK,
     ClockOption,

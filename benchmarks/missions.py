@@ -31,7 +31,7 @@ from syncline_design.choice.evaluate import error_key
 from syncline_design.choice.family import Family, family_of
 from syncline_design.choice.family_best import best_of_family, family_front, iter_family
 from syncline_design.choice.family_roads import choose_by_road, front_by_road
-from syncline_design.choice.options import Option, Resources
+from syncline_design.choice.option import Option, Resources
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
 from syncline_design.verdict.verify import CheckSettings

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from syncline_design.auditing.result import Audit
     from syncline_design.campaign.joint import JointRequest
     from syncline_design.campaign.watch_result import Watch
-    from syncline_design.choice.options import ResourceName
+    from syncline_design.choice.option import ResourceName
     from syncline_design.choice.outcome import Road
     from syncline_design.clocks.study import TimingSettings
     from syncline_design.comparison.accept import AcceptSettings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from syncline_design.choice.enumerate import all_designs
 from syncline_design.choice.evaluate import broken, error_key, rank
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Problem
 

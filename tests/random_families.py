@@ -15,7 +15,7 @@ from fractions import Fraction
 
 from random_problems import random_problem
 from syncline_design.choice.family import Family, family_of
-from syncline_design.choice.options import Option, Resources
+from syncline_design.choice.option import Option, Resources
 from syncline_design.choice.table import Problem, RoleTable
 
 Chosen = tuple[

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from fractions import Fraction
 
-from syncline_design.choice.options import Option, Resources
+from syncline_design.choice.option import Option, Resources
 from syncline_design.choice.table import (
     NO_CLOCK,
     ClockOption,

@@ -8,18 +8,15 @@ import pytest
 from pydantic import ValidationError
 
 from syncline_design.spec.case import usable_primitives
-from syncline_design.spec.catalog import (
-    Catalog,
-    ClockEntry,
+from syncline_design.spec.catalog import Catalog, ClockEntry, SensorEntry, TimestampingEntry
+from syncline_design.spec.load import load_builtin
+from syncline_design.spec.timestamp_errors import (
     ConstantError,
     EmpiricalError,
     NormalError,
-    SensorEntry,
-    TimestampingEntry,
     UniformError,
     read_error,
 )
-from syncline_design.spec.load import load_builtin
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import parse
 

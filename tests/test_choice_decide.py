@@ -15,7 +15,7 @@ from syncline_design.choice import decide
 from syncline_design.choice.decide import best, choose
 from syncline_design.choice.enumerate import all_designs
 from syncline_design.choice.evaluate import broken, evaluate, rank, total_error_m
-from syncline_design.choice.options import Resources
+from syncline_design.choice.option import Resources
 from syncline_design.choice.outcome import Choice, Infeasible, NoVerdict, TooLarge
 from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import (

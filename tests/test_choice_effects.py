@@ -18,7 +18,7 @@ import pytest
 from random_problems import random_problem
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.front import front
-from syncline_design.choice.options import Option
+from syncline_design.choice.option import Option
 from syncline_design.choice.table import Design, Problem
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text

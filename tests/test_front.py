@@ -19,7 +19,7 @@ from syncline_design.choice.enumerate import all_designs, best_by_enumeration
 from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
 from syncline_design.choice.front import front
 from syncline_design.choice.merged_front import merged_front
-from syncline_design.choice.options import Option, Resources
+from syncline_design.choice.option import Option, Resources
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.parts import is_feasible

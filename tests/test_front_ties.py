@@ -14,7 +14,8 @@ import pytest
 
 from syncline_design.choice.decide import choose
 from syncline_design.choice.front import front
-from syncline_design.choice.options import RESOURCES, Option, Resources
+from syncline_design.choice.option import Option, Resources
+from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice
 from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
 

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from random_problems import random_problem, with_random_limits
-from syncline_design.choice import milp
+from syncline_design.choice import milp, solver
 from syncline_design.choice.decide import choose
 from syncline_design.choice.enumerate import all_designs, best_by_enumeration
 from syncline_design.choice.evaluate import evaluate, rank
-from syncline_design.choice.milp import best_by_milp, is_recent
+from syncline_design.choice.milp import best_by_milp
 from syncline_design.choice.outcome import Choice, Deadline, Infeasible, NoVerdict
+from syncline_design.choice.solver import is_recent
 from syncline_design.choice.table import Limits, Problem
 from syncline_design.machine.deadline import within_s
 from test_front import one_stage, option
@@ -91,9 +92,9 @@ def test_what_lies_within_the_solvers_tolerance_is_cut_off(monkeypatch: pytest.M
 
 def test_default_gaps_are_not_used() -> None:
     """A gap of 1e-4 is 100 EUR in a million; ours are 0, one thread, a fixed seed."""
-    assert milp.OPTIONS["mip_rel_gap"] == 0.0
-    assert milp.OPTIONS["mip_abs_gap"] == 0.0
-    assert milp.OPTIONS["threads"] == 1
+    assert solver.OPTIONS["mip_rel_gap"] == 0.0
+    assert solver.OPTIONS["mip_abs_gap"] == 0.0
+    assert solver.OPTIONS["threads"] == 1
     cheap, dear = option("cheap", 1.0, 0.0, 10**6), option("dear", 1.0, 0.0, 10**6 + 1)
     fixed = option("fixed", 1.0, 0.0, 1)
     problem = one_stage([[dear, cheap], [fixed], [fixed]], Limits(None, 1.0), 1.0, 0.0)
@@ -104,13 +105,13 @@ def test_version_that_gives_wrong_optima_is_refused(monkeypatch: pytest.MonkeyPa
     assert not is_recent("1.14.0")
     assert is_recent("1.15.0")
     assert is_recent("2.0")
-    monkeypatch.setattr(milp.metadata, "version", lambda _: "1.14.0")
+    monkeypatch.setattr(solver.metadata, "version", lambda _: "1.14.0")
     with pytest.raises(NoVerdict, match=r"1\.14\.0 is too old"):
         best_by_milp(two_options(0.1, 0.0, 0.0, 1.0), Deadline())
 
 
 def test_canary_stops_a_wrong_solver(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(milp, "_SUNG", [])
+    monkeypatch.setattr(solver, "_SUNG", [])
 
     def wrong(self: Any, *_: Any, **__: Any) -> None:
         """Claims the optimum that HiGHS 1.14 claims: x = 0, z = 5."""
@@ -177,7 +178,7 @@ def test_presolve_that_undoes_itself_wrongly_is_left_out() -> None:
 
 def test_values_left_by_an_unfinished_solve_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a time limit cvxpy may leave values in the variables: only `optimal` counts."""
-    monkeypatch.setattr(milp, "_SUNG", [])
+    monkeypatch.setattr(solver, "_SUNG", [])
     real = cp.Problem.solve
     calls = []
 

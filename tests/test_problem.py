@@ -11,7 +11,7 @@ import pytest
 
 from syncline_design.choice.chosen_system import clock_error, system_of, timing_error
 from syncline_design.choice.evaluate import evaluate
-from syncline_design.choice.options import Option
+from syncline_design.choice.option import Option
 from syncline_design.choice.problem import build_problem, selection_of, sole_design, with_everything
 from syncline_design.choice.table import Design, Problem, with_limits
 from syncline_design.model import timing

@@ -14,7 +14,7 @@ import numpy as np
 from syncline_design.choice.best_first import lower_bound
 from syncline_design.choice.evaluate import Amount, broken, evaluate, known_or_more, rank
 from syncline_design.choice.narrowed import Narrowed, narrowed
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import Choice, Proof, TooLarge
 from syncline_design.choice.partition import best_of
 from syncline_design.choice.table import Design, Problem

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.options import (
     INT64_ROOM,
     RESOURCES,
@@ -17,7 +18,6 @@ from syncline_design.choice.options import (
     Floats,
     Indices,
     Options,
-    ResourceName,
 )
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.pareto import Columns, undominated

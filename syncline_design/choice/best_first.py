@@ -17,15 +17,8 @@ import numpy as np
 
 from syncline_design.choice.arrays import RoleArrays, Scaled, tabulate
 from syncline_design.choice.evaluate import Amount, broken, error_key, evaluate, rank
-from syncline_design.choice.options import (
-    MARGIN,
-    RESOURCES,
-    Bools,
-    Column,
-    Floats,
-    Indices,
-    ResourceName,
-)
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import MARGIN, RESOURCES, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.table import Design, Problem, VehicleTable, is_empty

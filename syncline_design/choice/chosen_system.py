@@ -7,25 +7,24 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
-from syncline_design.choice.options import Option
+from syncline_design.choice.option import Option
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model import timing
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Look, Platform, Sensor, ShareCurve, Stage, System
 from syncline_design.spec.case import Case, RoleCase, StageCase
-from syncline_design.spec.catalog import (
-    ClockEntry,
-    ConstantError,
-    NormalError,
-    SensorEntry,
-    TimestampError,
-    UniformError,
-)
+from syncline_design.spec.catalog import ClockEntry, SensorEntry
 from syncline_design.spec.exact import fraction_of
 from syncline_design.spec.existence import SOUND_MPS, is_acoustic, is_charged
 from syncline_design.spec.facts import FieldOfView
 from syncline_design.spec.noise_table import NoiseTable
+from syncline_design.spec.timestamp_errors import (
+    ConstantError,
+    NormalError,
+    TimestampError,
+    UniformError,
+)
 
 Vector = tuple[float, float, float]
 

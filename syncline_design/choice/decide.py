@@ -13,7 +13,7 @@ from syncline_design.choice.enumerate import best_by_enumeration
 from syncline_design.choice.evaluate import broken, evaluate, rank
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.merged_front import merged_front
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import (
     ROAD_NAMES,
     Choice,

@@ -10,7 +10,8 @@ import itertools
 import math
 from fractions import Fraction
 
-from syncline_design.choice.options import RESOURCES, Option, ResourceName, Resources
+from syncline_design.choice.option import Option, ResourceName, Resources
+from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.table import ClockOption, Design, Nearer, Pair, Problem
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import rounded

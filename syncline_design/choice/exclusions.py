@@ -9,7 +9,8 @@ from typing import overload
 
 import numpy as np
 
-from syncline_design.choice.options import Indices, Option, Options, sync_ratio
+from syncline_design.choice.option import Option, sync_ratio
+from syncline_design.choice.options import Indices, Options
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 

@@ -24,14 +24,8 @@ from syncline_design.choice.evaluate import (
     evaluate,
     known_or_more,
 )
-from syncline_design.choice.options import (
-    RESOURCES,
-    Indices,
-    Names,
-    Option,
-    ResourceName,
-    Resources,
-)
+from syncline_design.choice.option import Names, Option, ResourceName, Resources
+from syncline_design.choice.options import RESOURCES, Indices
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import Design, Objective, Problem, RoleTable
 from syncline_design.machine.quick_dataclass import dataclass

@@ -37,7 +37,8 @@ from syncline_design.choice.family_tables import (
     useful_clocks_of,
     useful_ways,
 )
-from syncline_design.choice.options import MARGIN, Floats, Indices, ResourceName
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import MARGIN, Floats, Indices
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.remaining import Ceiling
 from syncline_design.machine.deadline import in_force

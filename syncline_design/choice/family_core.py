@@ -19,7 +19,8 @@ from syncline_design.choice.family import Family
 from syncline_design.choice.family_best import primary_of
 from syncline_design.choice.family_bounds import Rest, may_matter
 from syncline_design.choice.family_tables import tabulate_family
-from syncline_design.choice.options import Names, Options
+from syncline_design.choice.option import Names
+from syncline_design.choice.options import Options
 from syncline_design.choice.table import NOTHING, Problem, RoleTable
 
 

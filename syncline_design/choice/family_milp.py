@@ -23,16 +23,10 @@ from syncline_design.choice.family import (
 )
 from syncline_design.choice.family_best import primary_of
 from syncline_design.choice.family_tables import clock_of, tabulate_family
-from syncline_design.choice.milp import (
-    ERROR_STEPS,
-    MOST_CUTS,
-    MilpModel,
-    Solver,
-    Variables,
-    best_of,
-)
+from syncline_design.choice.milp import ERROR_STEPS, MOST_CUTS, MilpModel, Variables, best_of
 from syncline_design.choice.options import Indices
 from syncline_design.choice.outcome import Deadline, NoVerdict, TooLarge
+from syncline_design.choice.solver import Solver
 from syncline_design.choice.table import Problem
 
 # Of all ways together; a program of more takes longer to write than to merge.

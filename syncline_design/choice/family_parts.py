@@ -9,7 +9,8 @@ import numpy as np
 
 from syncline_design.choice.family import Family, FamilyDesign
 from syncline_design.choice.holding import EntryKind, hold
-from syncline_design.choice.options import Bools, Indices, ResourceName
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import Bools, Indices
 
 Whole = Callable[[FamilyDesign], FamilyDesign]
 

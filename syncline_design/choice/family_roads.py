@@ -34,7 +34,8 @@ from syncline_design.choice.family_best import (
 from syncline_design.choice.family_bounds import Rest, least_of_clocks
 from syncline_design.choice.family_parts import Whole, narrowed_family, stated_family
 from syncline_design.choice.family_tables import FamilyTables, tabulate_family
-from syncline_design.choice.options import Floats, Indices, ResourceName
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import Floats, Indices
 from syncline_design.choice.outcome import NoVerdict, OutOfTime, Proof, Road, TooLarge
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force, within_s

@@ -10,15 +10,8 @@ import numpy as np
 
 from syncline_design.choice.family import Family
 from syncline_design.choice.merged_front import demand_structure, useful_clocks
-from syncline_design.choice.options import (
-    INT64_ROOM,
-    Bools,
-    Column,
-    Floats,
-    Indices,
-    ResourceName,
-    Spent,
-)
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import INT64_ROOM, Bools, Column, Floats, Indices, Spent
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.table import ClockOption, Problem

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from syncline_design.choice.merged_front import Points, merged_front
 from syncline_design.choice.narrowed import stated
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import FrontPoint, PriceStep
 from syncline_design.choice.simulated_front import accepted_front
 from syncline_design.choice.table import Problem

@@ -37,7 +37,8 @@ from syncline_design.choice.evaluate import (
 from syncline_design.choice.labels import Labels, total_m
 from syncline_design.choice.merge import Merge
 from syncline_design.choice.narrowed import Narrowed, says_all, whole_of
-from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices, ResourceName
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.remaining import Ceiling, lowered

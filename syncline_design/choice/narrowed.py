@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from syncline_design.choice.options import RESOURCES, Bools, Indices, Options, ResourceName
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import RESOURCES, Bools, Indices, Options
 from syncline_design.choice.table import ClockOption, Design, Problem, RoleTable
 from syncline_design.machine.quick_dataclass import dataclass
 

@@ -16,7 +16,8 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choice.acceptable import without_simulation
-from syncline_design.choice.options import Option, Options
+from syncline_design.choice.option import Option
+from syncline_design.choice.options import Options
 from syncline_design.choice.outcome import Fix
 from syncline_design.choice.parts import CLOSE, is_feasible
 from syncline_design.choice.table import NOTHING, Limits, Pair, Problem, RoleTable, with_limits

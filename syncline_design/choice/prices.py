@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from syncline_design.choice.options import RESOURCES, ResourceName, Resources
+from syncline_design.choice.option import ResourceName, Resources
+from syncline_design.choice.options import RESOURCES
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import (

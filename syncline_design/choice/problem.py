@@ -11,16 +11,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from syncline_design.choice.candidates import (
-    NO_SENSOR,
-    BySensor,
-    SensorEffects,
-    StageMotion,
-    candidates,
-    motion_of,
-)
+from syncline_design.choice.candidates import NO_SENSOR, BySensor, SensorEffects, candidates
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.prices import resources_of
+from syncline_design.choice.stage_motion import StageMotion, motion_of
 from syncline_design.choice.table import (
     NO_CLOCK,
     ClockOption,

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from syncline_design.choice.best_first import iter_first
 from syncline_design.choice.evaluate import error_key, evaluate
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import Deadline, FrontPoint
 from syncline_design.choice.table import Problem
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 from syncline_design.choice.acceptable import promising
 from syncline_design.choice.evaluate import error_key, evaluate
 from syncline_design.choice.judged import judgement
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import FrontPoint, Unfinished
 from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import Problem

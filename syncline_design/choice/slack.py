@@ -16,6 +16,7 @@ import numpy as np
 
 from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
+from syncline_design.choice.edges import CLOSE, edge, first_failing, tried
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate, pair_bound
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.narrowed import kept
@@ -49,8 +50,6 @@ from syncline_design.spec.case import Case
 # Values tried, over the term's own: from a nudge that only settles ties to a million times.
 GROWTHS = (1.0 + 1e-9, 1.0001, 1.01, 1.05, *(1.3**k for k in range(1, 53)), 1e6)
 COARSE = (1.0 + 1e-9, 1.1, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0)  # where each try is a simulation
-BISECTIONS = 60
-CLOSE = 1e-6
 SIMULATED_CLOSE = 1e-2  # simulation tells values apart no better at a bearable number of samples
 
 
@@ -344,7 +343,7 @@ def _simulated(
     try:
         if fails <= works or holds(fails):
             return row
-        at = _edge(holds, works, fails, SIMULATED_CLOSE)
+        at = edge(holds, works, fails, SIMULATED_CLOSE)
     except Unfinished:
         return row
     return replace(row, fails_at=at, limited_by=kinds.get(breaks, SIMULATED))
@@ -380,37 +379,3 @@ def _is_sole(problem: Problem) -> bool:
         if len(set(zip(pool.sensor.tolist(), pool.method.tolist(), strict=True))) > 1:
             return False
     return True
-
-
-def tried(value: float, growths: Sequence[float], fails_at: float | None = None) -> list[float]:
-    """Values to try, rising; just above the one at which the verdict fails is one of them."""
-    scale = value or (fails_at or 1.0) * 1e-6
-    values = {scale * growth for growth in growths}
-    if fails_at is not None:
-        edge = max(fails_at, value)
-        values |= {edge * (1.0 + 1e-9) or 1e-12, max(value, edge * (1.0 - CLOSE))}
-    return sorted(values)
-
-
-def first_failing(
-    holds: Callable[[float], bool],
-    values: Sequence[float],
-    start: float | None = None,
-    close: float = CLOSE,
-) -> float | None:
-    """Least of the values (and between them, to `close`) at which something no longer holds."""
-    last = values[0] if start is None else start
-    for value in values:
-        if not holds(value):
-            return _edge(holds, last, value, close)
-        last = value
-    return None
-
-
-def _edge(holds: Callable[[float], bool], works: float, fails: float, close: float) -> float:
-    for _ in range(BISECTIONS):
-        if fails - works <= close * abs(fails):
-            break
-        middle = 0.5 * (works + fails)
-        works, fails = (middle, fails) if holds(middle) else (works, middle)
-    return fails

@@ -13,16 +13,8 @@ import numpy as np
 
 from syncline_design.choice.evaluate import Evaluation, broken, evaluate
 from syncline_design.choice.narrowed import Narrowed, narrowed
-from syncline_design.choice.options import (
-    MARGIN,
-    RESOURCES,
-    Bools,
-    Column,
-    Floats,
-    Indices,
-    ResourceName,
-    Spent,
-)
+from syncline_design.choice.option import ResourceName
+from syncline_design.choice.options import MARGIN, RESOURCES, Bools, Column, Floats, Indices, Spent
 from syncline_design.choice.table import Design, Pair, Problem
 from syncline_design.machine.quick_dataclass import dataclass
 

@@ -17,15 +17,8 @@ from typing import Literal, Protocol
 import numpy as np
 
 from syncline_design.choice.exclusions import Exclusions
-from syncline_design.choice.options import (
-    Bools,
-    Floats,
-    Options,
-    Requires,
-    ResourceName,
-    Resources,
-    exactly,
-)
+from syncline_design.choice.option import Requires, ResourceName, Resources, exactly
+from syncline_design.choice.options import Bools, Floats, Options
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Literal
 
-from syncline_design.choice.options import Requires
+from syncline_design.choice.option import Requires
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.barred import barred_method
 from syncline_design.spec.case import Case, RoleCase, StageCase, usable_primitives

@@ -9,19 +9,13 @@ from fractions import Fraction
 
 import numpy as np
 
-from syncline_design.choice.candidates import (
-    NO_SENSOR,
-    Candidates,
-    SensorEffects,
-    StageMotion,
-    candidates,
-    motion_of,
-    sensor_error,
-)
+from syncline_design.choice.candidates import NO_SENSOR, Candidates, SensorEffects, candidates
 from syncline_design.choice.core import Beside, may_improve, total_least
 from syncline_design.choice.evaluate import Incumbent
-from syncline_design.choice.options import MARGIN, Bools, Floats, Option, Options
+from syncline_design.choice.option import Option
+from syncline_design.choice.options import MARGIN, Bools, Floats, Options
 from syncline_design.choice.problem import with_motions
+from syncline_design.choice.stage_motion import StageMotion, motion_of, sensor_error
 from syncline_design.choice.table import Design, Problem, RoleTable
 from syncline_design.choice.variations import PlatformFigure, SheetFigure, with_changed
 from syncline_design.machine.deadline import in_force

@@ -13,7 +13,7 @@ from typing import Literal
 
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.evaluate import broken, evaluate
-from syncline_design.choice.options import Option
+from syncline_design.choice.option import Option
 from syncline_design.choice.problem import sole_design
 from syncline_design.choice.table import Design
 from syncline_design.choice.variations import with_stage

@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from syncline_design.choice.evaluate import chosen_clocks, chosen_options, evaluate
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem
 from syncline_design.report.csv_out import plain_csv

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.choice.evaluate import chosen_options, evaluate
 from syncline_design.choice.judged import judgement
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import ROADS, FrontPoint, PriceStep
 from syncline_design.choice.slack import Slack
 from syncline_design.choice.table import Design, Problem

@@ -15,7 +15,8 @@ from syncline_design.report.words import PRIMITIVES
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
     from syncline_design.verdict.named import CloudDesign
-    from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
+    from syncline_design.verdict.syncline_figures import SynclineFigures
+    from syncline_design.verdict.tree import RequirementResult, Verdict
 
 # What draws is imported where it draws: ElementTree and matplotlib hide behind it.
 

@@ -26,7 +26,8 @@ from syncline_design.verdict.measured import claim_words
 if TYPE_CHECKING:
     from syncline_design.verdict.named import BillLine, NamedDesign
     from syncline_design.verdict.since import Earlier
-    from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
+    from syncline_design.verdict.syncline_figures import SynclineFigures
+    from syncline_design.verdict.tree import RequirementResult, Verdict
 
 
 def requirements(verdict: Verdict) -> Table:

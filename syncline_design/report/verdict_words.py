@@ -26,14 +26,8 @@ if TYPE_CHECKING:
     from syncline_design.verdict.named import NamedRole
     from syncline_design.verdict.optimization import Optimization
     from syncline_design.verdict.since import Baseline
-    from syncline_design.verdict.tree import (
-        Caution,
-        Checked,
-        LedgerRow,
-        RequirementResult,
-        Status,
-        Verdict,
-    )
+    from syncline_design.verdict.syncline_figures import LedgerRow
+    from syncline_design.verdict.tree import Caution, Checked, RequirementResult, Status, Verdict
 
 
 SEEN_SHARE = 0.001  # of the total: smaller terms have no row

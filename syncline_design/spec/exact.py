@@ -7,7 +7,12 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from syncline_design.model.quantity import Quantity
-from syncline_design.spec.catalog import ConstantError, NormalError, TimestampError, UniformError
+from syncline_design.spec.timestamp_errors import (
+    ConstantError,
+    NormalError,
+    TimestampError,
+    UniformError,
+)
 
 ROOT_DIGITS = 60
 

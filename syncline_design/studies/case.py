@@ -25,7 +25,8 @@ from syncline_design.studies.inputs import canonical, inputs_of
 from syncline_design.studies.loading import Base, Study
 from syncline_design.studies.record import SCHEMA, CaseFigures, CasePoint, CaseRecord, lost
 from syncline_design.verdict.named import ChoiceResult
-from syncline_design.verdict.tree import FileProblem, SynclineFigures, Verdict
+from syncline_design.verdict.syncline_figures import SynclineFigures
+from syncline_design.verdict.tree import FileProblem, Verdict
 
 # Layers that a check cannot import: they show its results.
 ABOVE_CHECKS = ("__main__.py", "cli", "comparison", "diagnosis", "logs", "paper", "report")

@@ -14,26 +14,16 @@ from datetime import date
 from fractions import Fraction
 from typing import NoReturn
 
-from syncline_design.choice.candidates import may_be_underway
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
-from syncline_design.choice.options import Option
+from syncline_design.choice.option import Option
 from syncline_design.choice.outcome import Unfinished
+from syncline_design.choice.stage_motion import may_be_underway
 from syncline_design.choice.table import Cut, Design, Judge, Problem, RoleTable, SimulatedJudgement
 from syncline_design.effects import registry
 from syncline_design.machine.input_files import FileContent
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.roles import ROLES, RoleName
-from syncline_design.model.system import UTC, Sensor, Stage, System
-from syncline_design.model.timing import (
-    NO_ERROR,
-    Constant,
-    Distribution,
-    Empirical,
-    Normal,
-    TimingError,
-    Uniform,
-)
+from syncline_design.model.system import System
 from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.simulation.run import DEFAULT_CAP
 from syncline_design.simulation.statistical import Wanted
@@ -41,6 +31,7 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS, Requirement
 from syncline_design.verdict.cuts import MOST_LEARNED, Learned, learned
+from syncline_design.verdict.grown import noise_alone, with_grown, without_names
 from syncline_design.verdict.stated import Certified, reached_m, stated, value_m, wanted_of
 from syncline_design.verdict.worst_cuts import Taught, taught
 
@@ -107,7 +98,7 @@ class Simulations:
         what_if: the system or the limit is not one of the spec itself; what is close stays open.
         """
         settings = replace(simulation_settings(case, self.seed), limit_m=None, limit_written=None)
-        nameless = _nameless(system)
+        nameless = without_names(system)
         key = (nameless, settings, quantile, limit_m)
         if key in self.known:
             return self.known[key]
@@ -120,7 +111,7 @@ class Simulations:
 
     def figure_keeps(self, system: System, wanted: Wanted | Certified, limit_m: float) -> bool:
         """Whether a figure of the error keeps a limit; one that exceeded a larger one does not."""
-        key = (_nameless(system), wanted)
+        key = (without_names(system), wanted)
         if self.figures.get(key, 0.0) > limit_m:
             return False
         if isinstance(wanted, Wanted):  # the certified one takes next to no time
@@ -131,7 +122,7 @@ class Simulations:
 
     def count(self, system: System) -> None:
         """One more system to simulate; Unfinished once there were too many."""
-        self.systems.add(_nameless(system))
+        self.systems.add(without_names(system))
         if len(self.systems) > self.most:
             self.refusals += 1
             raise Unfinished(f"the search stopped after {self.most} simulated designs")
@@ -188,7 +179,7 @@ class _SpecJudge:
         places[role] = place
         design = Design(tuple(places), (0,) * len(problem.vehicles))
         table = problem.roles[role]
-        bare = _noise_alone(system_of(self.case, problem, design), table.stage, table.role)
+        bare = noise_alone(system_of(self.case, problem, design), table.stage, table.role)
         return any(
             self._status(bare, name, HOPELESS * limit, what_if=True) == "fail"
             for name, limit in self.limits
@@ -252,7 +243,7 @@ class _SpecJudge:
             shift = option.tau() / tau if tau else Fraction(1)
             if noise != 1 or shift != 1:
                 grown = True
-                system = _grown(system, table.stage, table.role, float(noise), float(shift))
+                system = with_grown(system, table.stage, table.role, float(noise), float(shift))
         return system, grown
 
     def _status(self, system: System, name: str, limit_m: float, *, what_if: bool) -> str:
@@ -276,7 +267,7 @@ class _SpecJudge:
         known, requirement = self.simulations.learned, self._requirement(name)
         if requirement.kind not in STATED_KINDS or self._noise_depends():
             return
-        wanted, bare, seed = wanted_of(requirement), _nameless(system), self.simulations.seed
+        wanted, bare, seed = wanted_of(requirement), without_names(system), self.simulations.seed
         alike = (one for one in known if one.case is self.case and one.requirement == name)
         if sum(1 for _ in alike) >= MOST_LEARNED:
             return
@@ -309,7 +300,7 @@ class _SpecJudge:
         """What the requirement limits [m], and a limit that surely is above."""
         one = self._requirement(requirement)
         if one.kind in STATED_KINDS:
-            system = _nameless(self._system(problem, design)[0])
+            system = without_names(self._system(problem, design)[0])
             try:
                 found = value_m(system, wanted_of(one), float(one.limit), self.simulations.seed)
             except SimulationError as error:
@@ -334,75 +325,3 @@ class _SpecJudge:
             yield
         finally:
             simulations.most = before
-
-
-def _grown(system: System, stage: int, role: RoleName, noise: float, shift: float) -> System:
-    """A system with one sensor's noise and timestamp error times a factor each."""
-    own = system.stages[stage]
-    sensor: Sensor = getattr(own, role)
-    first, second, third = sensor.sigma
-    sensor = replace(
-        sensor,
-        sigma=(first * noise, second * noise, third * noise),
-        timing=_stretched(sensor.timing, shift),
-    )
-    stages = list(system.stages)
-    stages[stage] = own.with_sensor(role, sensor)
-    return replace(system, stages=tuple(stages))
-
-
-def _stretched(error: TimingError, factor: float) -> TimingError:
-    """A timestamp error with all its figures times a factor."""
-    match error.distribution:
-        case Uniform(low, high):
-            distribution: Distribution = Uniform(low * factor, high * factor)
-        case Normal(mean, std):
-            distribution = Normal(mean * factor, std * factor)
-        case Constant(value):
-            distribution = Constant(value * factor)
-        case Empirical(values):
-            distribution = Empirical(tuple(value * factor for value in values))
-    left = None if error.calibrated_s is None else error.calibrated_s * factor
-    bound = None if error.bound_s is None else error.bound_s * factor
-    return replace(error, distribution=distribution, calibrated_s=left, bound_s=bound)
-
-
-def _noise_alone(system: System, stage: int, role: RoleName) -> System:
-    """A system whose only error is the noise of one sensor; speeds then matter to nothing, and
-    nothing moves while sound is under way or between samples."""
-    stages = []
-    perfect_stamps = {"timing": NO_ERROR, "timeline": UTC}
-    at_once = {"rate_hz": None, "sound_mps": None, "travels": False}
-    for index, one in enumerate(system.stages):
-        perfect = {
-            name: replace(sensor, **perfect_stamps, **at_once)
-            if (index, name) == (stage, role)
-            else replace(sensor, sigma=(0.0, 0.0, 0.0), **perfect_stamps, **at_once)
-            for name in ROLES
-            if (sensor := getattr(one, name)) is not None
-        }
-        platform = replace(
-            one.platform, v_max_mps=1.0, omega_max_radps=1.0,
-            acceleration_mps2=0.0, angular_acceleration_radps2=0.0,
-        )  # fmt: skip
-        if role == "position":
-            platform = replace(platform, distance_m=1.0)
-        stages.append(replace(one, platform=platform, **perfect))
-    return replace(system, stages=tuple(stages), clock_offsets=(), effects=())
-
-
-def _nameless(system: System) -> System:
-    """A system without the names of its sensors, which no simulation looks at."""
-    return replace(system, stages=tuple(_nameless_stage(stage) for stage in system.stages))
-
-
-def _nameless_stage(stage: Stage) -> Stage:
-    def bare(sensor: Sensor | None) -> Sensor | None:
-        return None if sensor is None else replace(sensor, id="")
-
-    return replace(
-        stage,
-        position=bare(stage.position),
-        attitude=bare(stage.attitude),
-        ranging=bare(stage.ranging),
-    )

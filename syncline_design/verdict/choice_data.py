@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.judged import judgement
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.stampings import stampings_of
 from syncline_design.choice.table import Design, Problem

@@ -8,7 +8,7 @@ from typing import Any
 
 from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_options, evaluate
-from syncline_design.choice.options import Option
+from syncline_design.choice.option import Option
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import Budget, SensorRow

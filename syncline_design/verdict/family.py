@@ -18,7 +18,7 @@ from syncline_design.choice.family_best import FamilyPoint, SummedDesign, family
 from syncline_design.choice.family_parts import Whole, narrowed_family
 from syncline_design.choice.family_roads import choose_by_road, front_by_road, in_hand
 from syncline_design.choice.judged import judgement
-from syncline_design.choice.options import ResourceName, Resources
+from syncline_design.choice.option import ResourceName, Resources
 from syncline_design.choice.outcome import OutOfTime, Proof, Road
 from syncline_design.choice.prices import resources_of
 from syncline_design.choice.problem import sole_design

@@ -8,7 +8,7 @@ from dataclasses import replace
 from syncline_design.choice.family import FamilyDesign
 from syncline_design.choice.family_best import FamilyPoint, SummedDesign, iter_family
 from syncline_design.choice.family_parts import stated_family
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case

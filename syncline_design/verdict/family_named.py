@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from syncline_design.choice.family_best import FamilyPoint
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.verdict.choice_data import MOST_EXCLUDED, left_out, ruled_out
 from syncline_design.verdict.design_data import full_design

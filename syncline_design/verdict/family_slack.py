@@ -14,22 +14,22 @@ from fractions import Fraction
 
 import numpy as np
 
+from syncline_design.choice.edges import first_failing, tried
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate
 from syncline_design.choice.family_core import core_names, of_names, unguarded
 from syncline_design.choice.family_roads import choose_by_road
 from syncline_design.choice.narrowed import kept
-from syncline_design.choice.options import RESOURCES, Bools, Option, Options, ResourceName
+from syncline_design.choice.option import Option, ResourceName
+from syncline_design.choice.options import RESOURCES, Bools, Options
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.slack import (
     GROWTHS,
     Slack,
     error_limit,
-    first_failing,
     gone,
     payload,
     platform_what_if,
     tau_limits,
-    tried,
     with_change,
 )
 from syncline_design.choice.table import Design, Problem

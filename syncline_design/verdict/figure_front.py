@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 from syncline_design.choice.acceptable import iter_judged
 from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.narrowed import stated
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Judge, Problem
 from syncline_design.model.figure_text import percent

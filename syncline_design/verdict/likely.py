@@ -17,9 +17,10 @@ from typing import Literal
 
 import numpy as np
 
-from syncline_design.choice.candidates import motion_of
 from syncline_design.choice.evaluate import chosen_options, evaluate
-from syncline_design.choice.options import Bools, Floats, Option
+from syncline_design.choice.option import Option
+from syncline_design.choice.options import Bools, Floats
+from syncline_design.choice.stage_motion import motion_of
 from syncline_design.choice.table import Design, Problem, RoleTable
 from syncline_design.choice.variations import sigma_figures
 from syncline_design.machine.deadline import in_force

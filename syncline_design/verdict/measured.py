@@ -8,9 +8,10 @@ from collections.abc import Iterator, Sequence
 from syncline_design.machine.input_files import FileRead
 from syncline_design.model.figure_text import format_duration, percent, to_digits
 from syncline_design.spec.case import Case
-from syncline_design.spec.catalog import ClockEntry, TimestampError, TimestampingEntry
+from syncline_design.spec.catalog import ClockEntry, TimestampingEntry
 from syncline_design.spec.exact import tau_bound
 from syncline_design.spec.measured import MeasuredClaim
+from syncline_design.spec.timestamp_errors import TimestampError
 from syncline_design.verdict.design_data import UsedEntry
 from syncline_design.verdict.tree import Caution, ClaimShown, MeasuredEntry
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from fractions import Fraction
 
 from syncline_design.choice.family import FamilyEvaluation
 from syncline_design.choice.outcome import (
@@ -34,6 +32,13 @@ from syncline_design.verdict.family_choice import choice_of_family, robustness_o
 from syncline_design.verdict.family_infeasible import infeasible_family
 from syncline_design.verdict.family_named import Sums, ranked
 from syncline_design.verdict.likely import CONFIDENCE
+from syncline_design.verdict.mission_rows import (
+    JudgedMission,
+    family_rows,
+    least_margin,
+    with_sums,
+    worst_rows,
+)
 from syncline_design.verdict.named import (
     ChoiceResult,
     RankedDesign,
@@ -51,30 +56,12 @@ from syncline_design.verdict.tree import (
     Verdict,
     Word,
     decided,
-    finite,
     word_of,
 )
 from syncline_design.verdict.verified import framed
 
 _WORST_FIRST: dict[str, int] = {"fails": 0, "infeasible": 0, "indeterminate": 1, "meets": 2}
 SHARE = "CHOOSE_FOR"  # the implied requirement of a choice for a probability
-_STATUS_ORDER = {"fail": 0, "indeterminate": 1, "pass": 2}
-
-
-@dataclass(frozen=True, slots=True)
-class JudgedMission:
-    """One mission with the family's design: its verdict, and its rows at their worst corner."""
-
-    mission: Mission
-    selection: Selection
-    verdict: Verdict
-    rows: tuple[RequirementResult, ...]
-    alone: RankedDesign | None = None
-
-    @property
-    def word(self) -> Word:
-        """meets, fails or indeterminate."""
-        return word_of(self.rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +126,7 @@ def _verdict_on(
             replace(one, alone=pieces.made(f"{one.mission.name} alone", choose, None))
             for one, choose in ((one, _alone(one, build, work.seed)) for one in judged)
         ]
-    shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], _least_margin(one.rows)))
+    shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], least_margin(one.rows)))
     nothing: Robustness | None = None
     robust = nothing
     if work.case.spec.choose_for != "nominal":
@@ -224,8 +211,8 @@ def _judged(
     verified = verify(mission.case, problem, design, settings)
     verdict = verdict_on(mission.case, problem, verified, settings, ChoiceResult())
     rows.append(verified.requirements)
-    worst = _worst_rows(rows)
-    rows_here = _in_place(work.case, mission.case, _with_sums(mission.case, worst, sums))
+    worst = worst_rows(rows)
+    rows_here = _in_place(work.case, mission.case, with_sums(mission.case, worst, sums))
     return JudgedMission(mission, selection, verdict, rows_here)
 
 
@@ -260,62 +247,6 @@ def _named_in(problem: Problem, selection: Selection) -> Design:
         for vehicle in problem.vehicles
     ]
     return Design(tuple(options), tuple(clocks))
-
-
-def _worst_rows(rows: Sequence[Sequence[RequirementResult]]) -> tuple[RequirementResult, ...]:
-    """Of each requirement the worst row; the last rows are those at figures as given."""
-    given = {row.id: row for row in rows[-1]}
-    out: dict[str, RequirementResult] = {}
-    for some in rows:
-        for row in some:
-            known = out.get(row.id)
-            if known is None or _badness(row) < _badness(known):
-                out[row.id] = row
-    if len(rows) == 1:
-        return tuple(out.values())
-    return tuple(_at_worst(row, given.get(row.id)) for row in out.values())
-
-
-def _at_worst(row: RequirementResult, given: RequirementResult | None) -> RequirementResult:
-    if given is None or given.value is None or given.value == row.value:
-        return row
-    unit = "" if given.unit == "1" else f" {given.unit}"
-    told = (
-        f"at the worst end of the datasheet intervals; {to_digits(given.value, 6)}{unit} at "
-        f"given figures"
-    )
-    return replace(row, note="; ".join(part for part in (row.note, told) if part))
-
-
-def _badness(row: RequirementResult) -> tuple[int, float]:
-    margin = math.inf if row.margin is None else row.margin
-    return _STATUS_ORDER[row.status], margin
-
-
-def _with_sums(
-    case: Case, rows: Sequence[RequirementResult], sums: Sums
-) -> tuple[RequirementResult, ...]:
-    """Rows with cost, mass and power of all that the family buys."""
-    limits = {one.id: case.limit(one) for one in case.spec.requirements}
-    return tuple(
-        _with_sum(row, limits[row.id], sums[row.kind]) if row.kind in BUDGETS else row
-        for row in rows
-    )
-
-
-def _with_sum(
-    row: RequirementResult, limit: Fraction, amount: Fraction | None
-) -> RequirementResult:
-    if amount is None:
-        return row
-    passed = amount <= limit
-    margin = finite(float(limit - amount))
-    return replace(row, status="pass" if passed else "fail", value=float(amount), margin=margin)
-
-
-def _least_margin(rows: Sequence[RequirementResult]) -> float:
-    shares = [row.margin / row.limit for row in rows if row.margin is not None and row.limit]
-    return min(shares, default=math.inf)
 
 
 def _alone(
@@ -355,7 +286,7 @@ def _assembled(
         ),
         horizon=made.horizon,
         provenance=made.provenance,
-        requirements=_family_rows(judged) if several else shown.rows,
+        requirements=family_rows(judged) if several else shown.rows,
         design=bought(design, [one.verdict.design for one in judged], sums, bill),
         warnings=tuple(_warnings(judged, shown, several=several)),
         choice=choice if choice.proof is not None else None,
@@ -371,28 +302,6 @@ def _open_roles(work: Work) -> tuple[str, ...]:
         for table, role in zip(tables, work.family.roles, strict=True)
         if len(table.options) + len(table.excluded) > 1 or len(role) > 1
     )
-
-
-def _family_rows(judged: Sequence[JudgedMission]) -> tuple[RequirementResult, ...]:
-    """Of each requirement the row of the mission that is nearest to its limit, or beyond it."""
-    worst: dict[str, tuple[RequirementResult, str]] = {}
-    for one in judged:
-        for row in one.rows:
-            share = -math.inf if row.margin is None else row.margin / (row.limit or 1.0)
-            known = worst.get(row.id)
-            if known is None or (_STATUS_ORDER[row.status], share) < _order_of(known[0]):
-                worst[row.id] = (row, one.mission.name)
-    return tuple(
-        row
-        if row.kind in BUDGETS
-        else replace(row, note="; ".join(p for p in (f"in mission {name}", row.note) if p))
-        for row, name in worst.values()
-    )
-
-
-def _order_of(row: RequirementResult) -> tuple[int, float]:
-    share = -math.inf if row.margin is None else row.margin / (row.limit or 1.0)
-    return _STATUS_ORDER[row.status], share
 
 
 def _differing_roles(judged: Sequence[JudgedMission]) -> Iterator[Caution]:

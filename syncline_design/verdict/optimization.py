@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Annotated
 
-from syncline_design.choice.options import ResourceName
+from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import (
     Explanation,
     FrontPoint,

@@ -14,7 +14,7 @@ from syncline_design.choice.outcome import Explanation
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
-from syncline_design.model.budget import SyncModelName, TermKind
+from syncline_design.model.budget import SyncModelName
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
@@ -28,6 +28,7 @@ from syncline_design.verdict.named import (
     RankedDesign,
 )
 from syncline_design.verdict.since import Baseline
+from syncline_design.verdict.syncline_figures import SynclineFigures
 
 SCHEMA = "syncline-design/verdict/v1"
 SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
@@ -178,72 +179,6 @@ class MissionHorizon(Record):
     duration_s: float
     extent_m: float
     tilt_rad: float
-
-
-@dataclass(frozen=True, slots=True)
-class ModelTotal(Record):
-    """What one sync model says."""
-
-    sync_error_m: float
-    total_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class ModelTotals(Record):
-    """Both sync models side by side."""
-
-    syncline: ModelTotal
-    per_sensor: ModelTotal
-
-
-@dataclass(frozen=True, slots=True)
-class LeverArmFigures(Record):
-    """The same with the lever arm's rotation; differs: some figure changes by more than 10 %."""
-
-    tau_crit_s: float | None
-    total_m: float
-    sync_rate_mps: float
-    differs: bool
-
-
-@dataclass(frozen=True, slots=True)
-class StageSyncline(Record):
-    """One stage's part; tau_crit_s None: it has no limit."""
-
-    name: str
-    sensor_error_m: float
-    sync_rate_mps: float
-    tau_s: float
-    tau_crit_s: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class LedgerRow(Record):
-    """One term of the total error; share: its part of the total, 0 to 1."""
-
-    term: str
-    stage: str
-    value_m: float
-    kind: TermKind
-    share: float
-
-
-@dataclass(frozen=True, slots=True)
-class SynclineFigures(Record):
-    """What the Syncline says of a design, by the model of the spec and by both."""
-
-    model: SyncModelName
-    sensor_error_m: float
-    sync_rate_mps: float
-    tau_s: float
-    tau_crit_s: float | None
-    sync_error_m: float
-    systematic_error_m: float
-    total_m: float
-    models: ModelTotals
-    lever_arm: LeverArmFigures
-    stages: tuple[StageSyncline, ...]
-    ledger: tuple[LedgerRow, ...]
 
 
 @dataclass(frozen=True, slots=True)

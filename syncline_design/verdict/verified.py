@@ -17,23 +17,25 @@ from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.known_effects import describe
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.recheck import Recheck
+from syncline_design.verdict.syncline_figures import (
+    LedgerRow,
+    LeverArmFigures,
+    ModelTotal,
+    ModelTotals,
+    StageSyncline,
+    SynclineFigures,
+)
 from syncline_design.verdict.tree import (
     ErrorFigures,
     FileProblem,
     KnownEffect,
-    LedgerRow,
-    LeverArmFigures,
     MissionHorizon,
-    ModelTotal,
-    ModelTotals,
     PlatformFigures,
     Provenance,
     Refused,
     RequirementResult,
     SpecFrame,
     StageFrame,
-    StageSyncline,
-    SynclineFigures,
     Verdict,
     Word,
     finite,
