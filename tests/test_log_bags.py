@@ -224,3 +224,25 @@ def test_streams_read_together_are_the_streams_read_alone(tmp_path: Path, writer
         np.testing.assert_array_equal(
             np.concatenate(pieces, axis=1), np.stack(list(alone.values()))
         )
+
+
+def test_stamps_of_large_messages_are_those_of_their_whole(tmp_path: Path) -> None:
+    """Listing reads the beginnings of large messages alone; samples and stamps stay the same."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kinds, name = store.types, "sensor_msgs/msg/CompressedImage"
+    with Writer(tmp_path / "bag", version=9) as writer:
+        made = writer.add_connection("/camera", name, typestore=store)
+        for k in range(40):
+            stamp = kinds["builtin_interfaces/msg/Time"](sec=1_700_000_000 + k, nanosec=7 * k)
+            head = kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="camera")
+            image = kinds[name](header=head, format="jpeg", data=np.full(90_000, k, np.uint8))
+            writer.write(
+                made, (1_700_000_000 + k) * 10**9 + 10**7, store.serialize_cdr(image, name)
+            )
+    (stream,) = open_recording(tmp_path / "bag").streams()
+    assert stamps_of(stream) == [(1_700_000_000 + k) * 10**9 + 7 * k for k in range(40)]
+    pieces = list(open_recording(tmp_path / "bag").samples("/camera"))
+    assert np.concatenate([p.primary_ns for p in pieces]).tolist() == stamps_of(stream)

@@ -15,9 +15,11 @@ from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, S
 from syncline_design.logs.readers.timelines import calendar
 from syncline_design.logs.roles import Offer, Part, Role, Sureness, offers_of, parts_of
 from syncline_design.logs.run_parts import KnownRecording, one_run
+from syncline_design.logs.sources import opened
 from syncline_design.logs.static_arms import ArmBeside, arms_beside
 from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
+from syncline_design.logs.surveys import first_survey
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.figure_text import to_places
@@ -316,7 +318,9 @@ def _tried(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What keeps the mapping from working, else everything that it does to the values."""
     try:
-        sources = sources_of(offers, choice, "", poses)
+        lists = [o.path for o in offers if o.has("target") and o.stream.stamps is None]
+        survey = first_survey([opened(path) for path in lists], choice.columns, ())
+        sources = sources_of(offers, choice, "", poses, survey=survey)
     except BadInput as error:
         return (str(error),), ()
     return (), tuple(dict.fromkeys(note for one in sources for note in one.notes))

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from syncline_design.logs.cloud_ranging import Arms
 from syncline_design.logs.columns import (
     ATTITUDE,
     GEODETIC,
@@ -25,6 +28,7 @@ from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
 from syncline_design.logs.static_arms import arm_notes, arms_beside
 from syncline_design.logs.stream_sources import sources_of
+from syncline_design.logs.surveys import first_survey
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
 
@@ -50,11 +54,22 @@ def row_sources(
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
     held = _held(tables, choice.columns, stages)
     run = one_run(recordings)
-    sources = sources_of(offers_of(run), choice, prefix, poses, held)
+    survey = first_survey(tables, choice.columns, stages)
+    sources = sources_of(
+        offers_of(run), choice, prefix, poses, held, survey, _arms(arms or {}, stages)
+    )
     static = [pose for one in run for stream in one.streams() for pose in stream.static]
     for source in sources[:1]:
         source.notes += arm_notes(arms_beside(static, arms or {}))
     return [*tables, *sources]
+
+
+def _arms(arms: Mapping[str, tuple[float, float, float]], stages: Sequence[str]) -> Arms:
+    """Lever arms of the last stage's ranging sensor and of the first's antenna."""
+    zero = (0.0, 0.0, 0.0)
+    ranging, antenna = (arms.get(f"{stages[k]}.{role}", zero)
+                        for k, role in ((-1, "ranging"), (0, "position")))  # fmt: skip
+    return np.asarray(ranging), np.asarray(antenna)
 
 
 def _held(

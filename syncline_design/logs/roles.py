@@ -58,11 +58,20 @@ def offers_of(recordings: Sequence[Recording]) -> list[Offer]:
     return [Offer(one, stream) for one in recordings for stream in one.streams()]
 
 
-def parts_of(offers: Sequence[Offer], choice: LogChoice | None = None) -> dict[Role, Part]:
-    """The parts as far as they can be given; what the spec names goes first."""
+def parts_of(
+    offers: Sequence[Offer], choice: LogChoice | None = None, *, surveyed: bool = False
+) -> dict[Role, Part]:
+    """The parts as far as they can be given; what the spec names goes first.
+
+    surveyed: whether a file beside tells the places of targets, as a survey among the offers does.
+    """
     found = _stated(offers, choice)
+    surveyed = surveyed or any(o.has("target") and o.stream.stamps is None for o in offers)
     usable = [one for one in offers if one.stream.messages >= LEAST_MESSAGES and one.stream.stamps]
     paths = list(dict.fromkeys(one.path for one in usable))
+    cloud = _cloud(usable) if surveyed and "ranging" not in found else None
+    if cloud is not None:
+        found["ranging"] = cloud
     for role, choose in _CHOOSERS.items():
         if role not in found:
             part = choose(usable, found, paths)
@@ -85,7 +94,7 @@ def _named(offers: Sequence[Offer], role: Role, name: str) -> Offer:
     """A stream by its own name, by its file's, or by `file:stream`."""
     quantity = NEEDED[role]
     same = [o for o in offers if name in (o.name, f"{o.path.name}:{o.name}")]
-    same = same or [o for o in offers if name in (o.path.name, o.path.stem) and o.has(quantity)]
+    same = same or [o for o in offers if name in (o.path.name, o.path.stem) and _plays(o, role)]
     known = sorted({o.name for o in offers} | {o.path.name for o in offers})
     first = offers[0].path
     if not same:
@@ -95,7 +104,7 @@ def _named(offers: Sequence[Offer], role: Role, name: str) -> Offer:
             field=f"log.streams.{role}",
             expected=f"a stream with {quantity}: "
             + (
-                ", ".join(sorted(o.name for o in offers if o.has(quantity))[:12]) or "there is none"
+                ", ".join(sorted(o.name for o in offers if _plays(o, role))[:12]) or "there is none"
             ),
             hint=did_you_mean(name, known),
         )
@@ -103,14 +112,19 @@ def _named(offers: Sequence[Offer], role: Role, name: str) -> Offer:
         listed = ", ".join(f"{o.path.name}:{o.name}" for o in same)
         hint = "say which file: FILE:STREAM"
         raise refuse(first, f"{name!r} is in several files", found=listed[:300], hint=hint)
-    if not any(o.has(quantity) for o in same):
+    if not any(_plays(o, role) for o in same):
         raise refuse(
             same[0].path,
             f"{name} holds no {quantity}",
             field=f"log.streams.{role}",
             found=", ".join(same[0].stream.quantity) or "nothing that is read",
         )
-    return max((o for o in same if o.has(quantity)), key=lambda o: o.stream.messages)
+    return max((o for o in same if _plays(o, role)), key=lambda o: o.stream.messages)
+
+
+def _plays(offer: Offer, role: Role) -> bool:
+    """Whether a stream measures what a part needs; a cloud's points are as good as ranges."""
+    return offer.has(NEEDED[role]) or (role == "ranging" and offer.has("points"))
 
 
 Chooser = Callable[[Sequence[Offer], Mapping[Role, Part], Sequence[Path]], Part | None]
@@ -235,6 +249,18 @@ def _of_reference(role: Role) -> Chooser:
         return Part(role, best, "medium", "body rates beside the attitude, same body axes")
 
     return choose
+
+
+def _cloud(offers: Sequence[Offer]) -> Part | None:
+    """Points as ranges, where a trajectory with attitudes lies beside."""
+    clouds = [o for o in offers if o.has("points") and "point_x_m" in o.stream.columns]
+    told = [o for o in offers if o.has("position") and o.has("attitude")]
+    ranged = any(o.has("ranging") for o in offers)
+    if ranged or not clouds or not told:
+        return None
+    best = max(clouds, key=lambda o: o.stream.messages)
+    return Part("ranging", best, "medium", "points of a cloud: range and bearing from the "
+                "trajectory beside it")  # fmt: skip
 
 
 def _single(role: Role) -> Chooser:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
+from syncline_design.logs.cloud_ranging import NO_ARMS, Arms, with_ranges
 from syncline_design.logs.columns import (
     ATTITUDE,
     GEODETIC,
@@ -39,9 +40,11 @@ from syncline_design.logs.stream_values import (
     StreamValues,
     all_values,
 )
+from syncline_design.logs.surveys import Survey
 from syncline_design.spec.log_block import LogChoice
 
 Mask = NDArray[np.bool_]
+_OF_A_CLOUD: Final[tuple[Role, ...]] = ("ranging", "position", "attitude")
 
 
 class StreamSource:
@@ -72,14 +75,15 @@ class StreamSource:
 
 def sources_of(
     offers: Sequence[Offer], choice: LogChoice, prefix: str, poses: bool,
-    held: frozenset[Role] = frozenset(),
+    held: frozenset[Role] = frozenset(), survey: Survey | None = None, arms: Arms = NO_ARMS,
 ) -> list[StreamSource]:  # fmt: skip
     """The streams that a diagnosis needs of some recordings, canonical and on one timeline.
 
     prefix: of the first stage's columns.  poses: whether the system has an attitude sensor, so that
     of two trajectories both places and attitudes are compared.  held: parts that other files play.
+    survey, arms: of targets and of the vehicle, for ranges that a cloud's points tell.
     """
-    parts = _left(parts_of(offers, choice), held)
+    parts = _left(parts_of(offers, choice, surveyed="target" in held), held)
     _demand_parts(offers, {*parts, *held})
     pair = poses and is_pose_pair(parts)
     if pair:
@@ -94,6 +98,10 @@ def sources_of(
     on_one_datum([*several, *clocks], parts, values)
     if "reference" in parts and "position" in parts:
         in_one_frame(parts, values, choice, pair)
+    ranging = parts.get("ranging")
+    if ranging is not None and ranging.offer.has("points") and not ranging.offer.has("ranging"):
+        cloud, place, turn = (values[id(parts[r].offer)] for r in _OF_A_CLOUD)
+        with_ranges(cloud, place, turn, choice, survey, arms)
     return [
         _source(one, [r for r, p in parts.items() if id(p.offer) == key], prefix, pair, calendar)
         for key, one in values.items()

@@ -110,6 +110,12 @@ def values_of(offer: Offer, pieces: Sequence[Piece], choice: LogChoice) -> Strea
     kept = {*GLOBE, "height_m", "height_msl_m", "separation_m", *POSITION, *ATTITUDE, *VELOCITY}
     kept |= {*RATE, *RANGING, *TARGET, "target_id", *(f"target_{g}" for g in (*GLOBE, "height_m"))}
     kept |= {"clock_utc_ns"}
+    if "points" in offer.stream.quantity:
+        kept |= {"utm_zone", *(f"point_{a}_m" for a in "xyz")}
+        label = choice.columns.get("target_id", "")
+        if label in found.columns:
+            found.columns["target_id"] = found.columns[label].astype(float)
+            found.note(f"{label} tells which target a point is of, as the spec says")
     found.columns = {name: v for name, v in found.columns.items() if name in kept}
     return found
 

@@ -10,7 +10,14 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.logs import delimited
 from syncline_design.logs.cells import trimmed
-from syncline_design.logs.columns import GEODETIC, TARGET, TARGET_ID, TIME
+from syncline_design.logs.columns import (
+    GEODETIC,
+    TARGET,
+    TARGET_ID,
+    TIME,
+    known_names,
+    si_columns,
+)
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.sources import RowSource, TextSource
 from syncline_design.machine.quick_dataclass import dataclass
@@ -37,6 +44,17 @@ def is_survey(found: Found) -> bool:
     """Whether a file names targets and their places, and has no times."""
     named = TARGET_ID in found and TIME not in found
     return named and any(name in found for names in PLACES for name in names)
+
+
+def first_survey(
+    tables: Sequence[RowSource], mapping: Mapping[str, str], stages: Sequence[str]
+) -> Survey | None:
+    """The first survey of targets among tables."""
+    for table in tables:
+        found = si_columns(table.header, mapping, known_names(stages))
+        if is_survey(found):
+            return survey_of(table, found)
+    return None
 
 
 def has_places(columns: Mapping[str, Array]) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
@@ -59,6 +60,7 @@ class LasRecording(BatchRecording):
         self._not_finite = 0
         self._back = 0
         self._frame: Frame = "unknown"
+        self._zone = 0
 
     def _batches(self, wanted: str | None) -> Iterator[Batch]:
         timed = self._claims.point_format in TIMED
@@ -76,7 +78,9 @@ class LasRecording(BatchRecording):
                 back += int(np.count_nonzero(np.diff(np.concatenate([[last], known])) < 0))
                 last = float(known[-1]) if known.shape[0] else last
             count += len(points)
-            columns = _columns(points) if wanted is not None else dict.fromkeys(_NAMES, _NONE)
+            columns = dict.fromkeys(_NAMES, _NONE) if wanted is None else _columns(points)
+            if wanted is not None and self._zone:
+                columns["utm_zone"] = np.full(len(points), float(self._zone))
             yield Batch(self.path.stem, len(points), stamps, None, columns)
         if not count:
             raise refuse(self.path, "no point in the cloud")
@@ -122,7 +126,7 @@ class LasRecording(BatchRecording):
         with self.path.open("rb") as file, quiet("laspy"):
             with no_panic_shown() if self._claims.packed else nullcontext():
                 reader = self._reader(file)
-            self._frame = _frame(reader.header)
+            self._frame, self._zone = _frame(reader.header), _zone(reader.header)
             at = 0
             while at < end:
                 wanted = min(first - at, MOST_ROWS) if at < first else min(rows, end - at)
@@ -231,7 +235,12 @@ def no_panic_shown() -> Iterator[None]:
         os.close(nowhere)
 
 
-_NAMES = ("point_x_m", "point_y_m", "point_z_m", "intensity", "point_source_id")
+_FIELDS = ("intensity", "point_source_id", "user_data")
+_NAMES = ("point_x_m", "point_y_m", "point_z_m", *_FIELDS)
+_LABEL = "target_id"  # an extra dimension: which surveyed target a point is of
+_ZONE = re.compile(r"UTM[ _]+zone[ _]*(\d{1,2})[ _]*([NS])", re.IGNORECASE)
+_GRIDS = {32_600: 1, 32_700: -1}  # EPSG's codes of UTM on WGS 84: these plus the zone
+_PROJECTED = 3072  # GeoTIFF's key of the projected coordinate system
 _NONE: NDArray[Any] = np.zeros(0)
 
 
@@ -245,7 +254,8 @@ def _said(error: BaseException) -> str:
 def _columns(points: Any) -> dict[str, NDArray[Any]]:
     with np.errstate(over="ignore", invalid="ignore"):  # of scales that a damaged header claims
         columns = {f"point_{a}_m": np.asarray(getattr(points, a), dtype=float) for a in "xyz"}
-    for name in ("intensity", "point_source_id"):
+    labelled = _LABEL in points.point_format.extra_dimension_names
+    for name in (*_FIELDS, _LABEL) if labelled else _FIELDS:
         columns[name] = np.asarray(points[name])
     return columns
 
@@ -259,15 +269,30 @@ def _look_adjusted(times: NDArray[np.float64]) -> bool:
     return not 0 <= middle < LAST_WEEK_SECOND
 
 
+def _zone(header: Any) -> int:
+    """The zone of UTM on WGS 84, below zero south of the equator; 0 where the file tells none."""
+    words, codes = "", set()
+    for record in header.vlrs:
+        for name in ("string", "strings"):
+            words += str(getattr(record, name, ""))
+        codes |= {k.value_offset for k in getattr(record, "geo_keys", ()) if k.id == _PROJECTED}
+    for code in codes:
+        for first, sign in _GRIDS.items():
+            if 0 < code - first <= 60:
+                return int(sign * (code - first))
+    found = _ZONE.search(words)
+    if found is None or not 0 < int(found[1]) <= 60:
+        return 0
+    return int(found[1]) * (1 if found[2].upper() == "N" else -1)
+
+
 def _frame(header: Any) -> Frame:
     """By the words of the coordinate system, where the header holds one."""
     words = ""
     for record in header.vlrs:
         for name in ("string", "strings"):
             words += str(getattr(record, name, ""))
-    if "UTM" in words:
-        return "utm"
-    return "unknown"
+    return "utm" if "UTM" in words or _zone(header) else "unknown"
 
 
 def _recognises(head: FileHead) -> int:

@@ -119,7 +119,7 @@ class McapFile(Container):
             channel = self._channels.get(number)
             if channel is None:
                 raise DamagedError("a message of no known channel")
-            if self.wanted is None or channel.topic == self.wanted:
+            if self.wanted is None or channel.topic in self.wanted:
                 yield RawMessage(channel, log_ns, publish_ns, data[body + _MESSAGE.size : at])
 
     def _of(self, file: Any, whole: bool) -> Iterator[Any]:
@@ -143,7 +143,7 @@ class McapFile(Container):
             channel = self._channels.get(record.channel_id)
             if channel is None:
                 raise DamagedError("a message of no known channel")
-            if self.wanted is not None and channel.topic != self.wanted:
+            if self.wanted is not None and channel.topic not in self.wanted:
                 return
             yield RawMessage(channel, record.log_time, record.publish_time, record.data)
         elif isinstance(record, self._records.Schema):

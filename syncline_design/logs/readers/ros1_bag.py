@@ -90,7 +90,7 @@ class Ros1Bag(Container):
                 if channel is not None and body + 4 + length <= end:
                     seconds, rest = _TIME.unpack_from(data, at + alike.time)
                     at = body + 4 + length
-                    if self.wanted is not None and channel.topic != self.wanted:
+                    if self.wanted is not None and channel.topic not in self.wanted:
                         continue
                     stamp = seconds * 1_000_000_000 + rest
                     yield RawMessage(channel, stamp, None, data[body + 4 : at])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -29,6 +29,8 @@ METADATA = "metadata.yaml"
 MOST_METADATA = 1 << 24
 MOST_MESSAGE = 1 << 28
 MOST_FILES = 10_000
+SMALL = 8_192  # bytes; of longer messages that much is read where stamps are all that is wanted
+WHOLE = 16  # messages of a topic that are read to their ends all the same: they say what it is
 STEPS = 100_000  # of SQLite's machine between two looks at the clock
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
@@ -59,10 +61,10 @@ class Ros2Bag(Container):
             raise DamagedError(f"cannot be read: {error.strerror}") from None
         if head.startswith(MCAP_MAGIC):
             inner = McapFile(path)
-            inner.wanted = self.wanted
+            inner.wanted, inner.brief = self.wanted, self.brief
             yield from inner._read()
         elif head == MAGIC:
-            yield from _of_database(path, self.wanted)
+            yield from _of_database(path, self.wanted, self.brief)
         elif head.startswith(ZSTD_MAGIC):
             hint = f"zstd -d {path.name}"
             raise refuse(path, "the bag's file is compressed as a whole", found="zstd", hint=hint)
@@ -107,8 +109,11 @@ def _named(path: Path) -> list[str]:
         raise refuse(path, "no metadata of a bag", found=short) from None
 
 
-def _of_database(path: Path, wanted: str | None) -> Iterator[RawMessage]:
-    """Messages by their number, which is their order of arrival; only real tables are asked."""
+def _of_database(path: Path, wanted: frozenset[str] | None, brief: bool) -> Iterator[RawMessage]:
+    """Messages by their number, which is their order of arrival; only real tables are asked.
+
+    brief: of large messages only their beginnings, behind the first of each topic.
+    """
     try:
         file = sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1", uri=True)
     except sqlite3.Error as error:
@@ -119,11 +124,8 @@ def _of_database(path: Path, wanted: str | None) -> Iterator[RawMessage]:
         file.set_progress_handler(_checked, STEPS)
         channels, packed = _channels(file, path)
         budget = UnpackBudget(path, path.stat().st_size)
-        only = [n for n, c in channels.items() if wanted is not None and c.topic == wanted]
-        some = f"WHERE topic_id IN ({', '.join('?' * len(only))})" if only else ""
-        rows = file.execute(
-            f"SELECT topic_id, timestamp, data FROM messages {some} ORDER BY id", only
-        )
+        only = [n for n, c in channels.items() if wanted is not None and c.topic in wanted]
+        rows = _rows(file, only, brief=brief and not packed and _is_whole(path))
         for topic, stamp, data in rows:
             channel = channels.get(topic)
             if channel is None or not isinstance(stamp, int) or not isinstance(data, bytes):
@@ -135,6 +137,39 @@ def _of_database(path: Path, wanted: str | None) -> Iterator[RawMessage]:
         raise DamagedError(str(error)[:160]) from None
     finally:
         file.close()
+
+
+def _rows(
+    file: sqlite3.Connection, only: Sequence[Any], *, brief: bool
+) -> Iterator[tuple[Any, Any, Any]]:
+    """(topic, time, data) of every message, or of some topics."""
+    some = f"WHERE topic_id IN ({', '.join('?' * len(only))})" if only else ""
+    if not brief:
+        yield from file.execute(
+            f"SELECT topic_id, timestamp, data FROM messages {some} ORDER BY id", only
+        )
+        return
+    # neither the length nor the type of a value makes SQLite read it
+    small = f"CASE WHEN length(data) <= {SMALL} OR typeof(data) <> 'blob' THEN data END"
+    seen: dict[Any, int] = {}
+    for topic, stamp, data, number in file.execute(
+        f"SELECT topic_id, timestamp, {small}, id FROM messages {some} ORDER BY id", only
+    ):
+        if data is not None:
+            yield topic, stamp, data
+            continue
+        seen[topic] = seen.get(topic, 0) + 1
+        with file.blobopen("messages", "data", number, readonly=True) as blob:
+            yield topic, stamp, blob.read() if seen[topic] <= WHOLE else blob.read(SMALL)
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a database is as long as its head says: of a cut one every message is read."""
+    with path.open("rb") as file:
+        head = file.read(32)
+    page = int.from_bytes(head[16:18], "big")
+    pages = int.from_bytes(head[28:32], "big")
+    return 0 < pages * (65_536 if page == 1 else page) <= path.stat().st_size
 
 
 def _decoded(raw: bytes) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
@@ -34,6 +35,7 @@ MOST_CLOUDS = 12  # of a topic, that are unpacked to see when their points were 
 MOST_TOPICS = 20_000
 RATIO, FREE_BYTES = 200, 1 << 30  # a file may unpack to this many times its size, and this much
 RECORDED = "log time"
+NAN = float("nan")
 
 
 class DamagedError(Exception):
@@ -81,21 +83,28 @@ class Container(ABC):
         self.path, self.format = path, format
         self.incomplete: Incomplete | None = None
         self.cut = ""  # what is known of a cut before reading comes to it
-        self.wanted: str | None = None  # the one topic that is read; None: all
+        self.wanted: frozenset[str] | None = None  # the topics that are read; None: all
+        self.brief = False  # whether beginnings do of large messages, behind the first of a topic
 
     @abstractmethod
     def _read(self) -> Iterator[RawMessage]:
         """Every message in the order of the file; DamagedError where that ends early."""
 
-    def of_topic(self, topic: str) -> Iterator[RawMessage]:
-        """The messages of one topic, up to the last good one."""
-        known, self.wanted = self.incomplete, topic
+    def of_topics(self, topics: frozenset[str]) -> Iterator[RawMessage]:
+        """The messages of some topics, and maybe of others, up to the last good one."""
+        known, self.wanted = self.incomplete, topics
         try:
-            for message in self.messages():
-                if message.channel.topic == topic:
-                    yield message
+            yield from self.messages()
         finally:
             self.wanted, self.incomplete = None, known
+
+    def beginnings(self) -> Iterator[RawMessage]:
+        """Every message, of large ones what their stamps need, where the container can."""
+        self.brief = True
+        try:
+            yield from self.messages()
+        finally:
+            self.brief = False
 
     def messages(self) -> Iterator[RawMessage]:
         """Every message up to the last good one; then `incomplete` is known."""
@@ -141,6 +150,7 @@ class RosRecording:
         self._container = container
         self.path, self.format = container.path, container.format
         self._channels: dict[str, BagChannel] = {}
+        self._known: dict[tuple[str, str], _Tally] = {}
 
     @property
     def incomplete(self) -> Incomplete | None:
@@ -148,11 +158,16 @@ class RosRecording:
 
     def streams(self) -> tuple[Stream, ...]:
         tallies: dict[tuple[str, str], _Tally] = {}
-        for message in self._container.messages():
-            key = (message.channel.topic, message.channel.kind)
-            tally = tallies.get(key)
+        of_channel: dict[int, _Tally] = {}  # the container keeps its channels
+        for message in self._container.beginnings():
+            tally = of_channel.get(id(message.channel))
             if tally is None:
-                tally = tallies[key] = self._begun(message, len(tallies))
+                key = (message.channel.topic, message.channel.kind)
+                tally = tallies.get(key)
+                if tally is None:
+                    tally = tallies[key] = self._begun(message, len(tallies))
+                if tally.channel is message.channel:
+                    of_channel[id(message.channel)] = tally
             _count(tally, message)
         topics = [topic for topic, _ in tallies]
         found = []
@@ -172,7 +187,14 @@ class RosRecording:
         first = _unpacked(unpack, message.data)
         meaning = None if first is None else meaning_of(channel.topic, channel.kind, first)
         name, read = own or ("", None)
-        return _Tally(channel, name, read, meaning, unpack)
+        begun = _Tally(channel, name, read, meaning, unpack)
+        self._known[channel.topic, channel.kind] = begun
+        return begun
+
+    def _rows(self, message: RawMessage) -> _Rows:
+        """Rows of a topic, read as it was listed: its types are compiled once."""
+        channel = message.channel
+        return _rows_of(self._known.get((channel.topic, channel.kind)) or self._begun(message, 0))
 
     def samples(self, name: str) -> Iterator[Piece]:
         if name not in self._channels:
@@ -181,15 +203,15 @@ class RosRecording:
         if wanted is None:
             raise refuse(self.path, f"no stream {name}", found=", ".join(sorted(self._channels)))
         collected: _Rows | None = None
-        for message in self._container.of_topic(wanted.topic):
-            if message.channel.kind != wanted.kind:
+        for message in self._container.of_topics(frozenset({wanted.topic})):
+            if message.channel.topic != wanted.topic or message.channel.kind != wanted.kind:
                 continue
             if collected is None:
-                collected = _rows_of(self._begun(message, 0))
+                collected = self._rows(message)
             collected.add(message)
-            if len(collected) >= PIECE_ROWS:
+            if collected.held >= PIECE_ROWS:
                 yield collected.piece()
-        if collected is not None and len(collected):
+        if collected is not None and collected.held:
             yield collected.piece()
 
     def together(self, names: Sequence[str]) -> Iterator[tuple[str, Piece]]:
@@ -198,20 +220,24 @@ class RosRecording:
             self.streams()
         wanted = {(c.topic, c.kind): n for n, c in self._channels.items() if n in names}
         rows: dict[str, _Rows] = {}
-        known = self.incomplete
-        for message in self._container.messages():
-            name = wanted.get((message.channel.topic, message.channel.kind))
-            if name is None:
+        of_channel: dict[int, tuple[str, _Rows | None]] = {}  # the container keeps its channels
+        for message in self._container.of_topics(frozenset(topic for topic, _ in wanted)):
+            channel = message.channel
+            known = of_channel.get(id(channel))
+            if known is None:
+                name = wanted.get((channel.topic, channel.kind), "")
+                if name and name not in rows:
+                    rows[name] = self._rows(message)
+                known = of_channel[id(channel)] = (name, rows.get(name))
+            collected = known[1]
+            if collected is None:
                 continue
-            if name not in rows:
-                rows[name] = _rows_of(self._begun(message, 0))
-            rows[name].add(message)
-            if len(rows[name]) >= PIECE_ROWS:
-                yield name, rows[name].piece()
-        self._container.incomplete = known
-        for name, collected in rows.items():
-            if len(collected):
-                yield name, collected.piece()
+            collected.add(message)
+            if collected.held >= PIECE_ROWS:
+                yield known[0], collected.piece()
+        for name, last in rows.items():
+            if last.held:
+                yield name, last.piece()
 
 
 @dataclass(slots=True)
@@ -220,32 +246,38 @@ class _Rows:
 
     tally: _Tally
     width: int
-    values: list[Any] = field(default_factory=list)
-    primary: list[int] = field(default_factory=list)
-    secondary: list[int] = field(default_factory=list)
-
-    def __len__(self) -> int:
-        return len(self.primary)
+    held: int = 0
+    values: array[float] = field(default_factory=lambda: array("d"))
+    primary: StampColumn = field(default_factory=StampColumn)
+    secondary: StampColumn = field(default_factory=StampColumn)
 
     def add(self, message: RawMessage) -> None:
-        tally = self.tally
-        row = None
+        tally, data = self.tally, message.data
         if tally.meaning is not None:
-            unpacked = _unpacked(tally.unpack, message.data)
-            row = None if unpacked is None else tally.meaning.row(unpacked)
-        self.values.append(row if row is not None else (float("nan"),) * self.width)
-        own = tally.own_of(message.data) if tally.own_of is not None else message.log_ns
-        self.primary.append(own)
+            unpacked = _unpacked(tally.unpack, data)
+            self._hold(None if unpacked is None else tally.meaning.row(unpacked))
+        self.primary.append(tally.own_of(data) if tally.own_of is not None else message.log_ns)
         self.secondary.append(message.log_ns)
+        self.held += 1
+
+    def _hold(self, row: Sequence[Any] | None) -> None:
+        """Figures of one message, as many as there are columns."""
+        if row is None or len(row) != self.width:
+            row = (NAN,) * self.width
+        try:
+            self.values.extend(row)
+        except TypeError:  # an array whose first figures stand already is set right
+            del self.values[self.held * self.width :]
+            self.values.extend(np.array(row, dtype=float).tolist())
 
     def piece(self) -> Piece:
         columns: Mapping[str, Any] = {}
         if self.tally.meaning is not None:
-            table = np.array(self.values, dtype=float).reshape(len(self), self.width)
+            table = np.array(self.values, dtype=float).reshape(self.held, self.width)
             columns = {n: table[:, k] for k, n in enumerate(self.tally.meaning.columns)}
-        primary = np.array(self.primary, dtype=np.int64)
-        secondary = np.array(self.secondary, dtype=np.int64)
-        self.values, self.primary, self.secondary = [], [], []
+        primary, secondary = self.primary.values(), self.secondary.values()
+        self.values, self.primary, self.secondary = array("d"), StampColumn(), StampColumn()
+        self.held = 0
         return Piece(primary, secondary if self.tally.own_of is not None else None, columns)
 
 

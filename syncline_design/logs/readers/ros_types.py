@@ -144,8 +144,12 @@ def unpacker(channel: BagChannel, path: Path) -> Callable[[bytes], Any] | None:
     store = _own_store(channel, typesys) or _standard(channel.encoding, path)
     if channel.kind not in store.fielddefs:
         return None
-    method = store.deserialize_ros1 if channel.encoding == "ros1" else store.deserialize_cdr
-    return lambda data: method(data, channel.kind)
+    kind = channel.kind
+    if channel.encoding == "ros1":
+        of_ros1 = store.deserialize_ros1
+        return lambda data: of_ros1(data, kind)
+    of_cdr = store.deserialize_cdr
+    return lambda data: of_cdr(data, kind)
 
 
 def _own_store(channel: BagChannel, typesys: Any) -> Any:
