@@ -27,7 +27,8 @@ from syncline_design.auditing.result import (
     StampFault,
 )
 from syncline_design.auditing.series import NS, Array, Series, seconds, series_of, spread
-from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
+from syncline_design.auditing.shifts import Shift, Shifts, without_shifts
+from syncline_design.auditing.slips import without_slips
 from syncline_design.auditing.stream_epochs import as_declared, as_epochs, known_offset, with_epoch
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
