@@ -36,12 +36,8 @@ from syncline_design.model.known import Known
 from syncline_design.model.quantity import Dimension
 from syncline_design.report import numbers
 from syncline_design.report.choice_csv import designs_csv, front_csv
-from syncline_design.report.on_choice import (
-    designs_table,
-    front_table,
-    slack_table,
-    staircase_table,
-)
+from syncline_design.report.on_choice import designs_table, front_table, staircase_table
+from syncline_design.report.on_hinges import slack_table
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load, load_text

@@ -13,7 +13,7 @@ import pytest
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Problem
-from syncline_design.report.on_choice import slack_table
+from syncline_design.report.on_hinges import slack_table
 from syncline_design.report.render_console import table_lines
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text

@@ -1,4 +1,4 @@
-"""Figures as people read them in reports; the units themselves come from `units`."""
+"""Figures as people read them in reports; their units from `model/unit_table`."""
 
 from __future__ import annotations
 

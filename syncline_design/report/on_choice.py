@@ -11,7 +11,6 @@ from syncline_design.choice.evaluate import chosen_options, evaluate
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import ROADS, FrontPoint, PriceStep
-from syncline_design.choice.slack import Slack
 from syncline_design.choice.table import Design, Problem
 from syncline_design.report import numbers
 from syncline_design.report.document import (
@@ -30,12 +29,13 @@ from syncline_design.report.on_alternatives import (
     bargain_nodes,
     ways_cell,
 )
+from syncline_design.report.on_hinges import hinges_nodes
 from syncline_design.report.on_infeasibility import infeasibility_nodes
 from syncline_design.report.on_nearest import asked_limit, nearest_nodes
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import qualification, warning_nodes
-from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
+from syncline_design.report.words import OBJECTIVES, OUTCOMES
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
 from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
@@ -364,52 +364,3 @@ def staircase_table(
     limits = "Accuracy limit #" if figure is None else f"Limit of {figure} #"
     heads = (limits, f"{resource.capitalize()} #", "More than the step before #")
     return table("What accuracy costs" if figure is None else "What it costs", heads, rows)
-
-
-def hinges_nodes(hinges: Optimization) -> list[Node]:
-    """Slack of every figure, tolerances, what to measure next."""
-    nodes = [] if hinges.slack is None else show(slack_table(hinges.slack))
-    if hinges.tolerances is not None:
-        nodes.append(Text(hinges.tolerances.text))
-    if hinges.measure_next is None:
-        return nodes
-    if not hinges.measure_next:
-        words = "No single datasheet figure, 20 % up or down, changes the choice."
-        return [*nodes, Text(words)]
-    rows = [
-        (one.figure, one.value_text, one.at_text,
-         "20 % assumed" if one.assumed_tolerance else "datasheet tolerance", one.becomes)
-        for one in hinges.measure_next
-    ]  # fmt: skip
-    heads = ("Figure", "Now", "Flips at", "Range", "The choice becomes")
-    caption = "What to measure next: a single figure that changes the choice"
-    return [*nodes, *show(table(caption, heads, rows))]
-
-
-def slack_table(rows: Sequence[Slack]) -> Table:
-    """The slack ledger, a row per term."""
-    return table(
-        "How far each term may grow",
-        ("Term", "Now #", "Verdict fails at #", "What then breaks", "Payload changes at #"),
-        [
-            (
-                f"{row.stage} {row.term}" + (f", {row.mission}" if row.mission else ""),
-                Cell(numbers.si_quantity(row.value, row.unit), row.value),
-                _threshold(row, row.fails_at, "verdict"),
-                KINDS.get(row.limited_by or "", row.limited_by or ""),
-                _threshold(row, row.payload_changes_at, "payload"),
-            )
-            for row in rows
-        ],
-    )
-
-
-def _threshold(row: Slack, value: float | None, what: str) -> Cell:
-    """A threshold; without one `never` where that is proven, else how far was looked."""
-    if value is not None:
-        return Cell(numbers.si_quantity(value, row.unit), value)
-    if what in row.never:
-        return Cell("never")
-    if row.searched_to is None:
-        return Cell("not known")
-    return Cell(f"not up to {numbers.si_quantity(row.searched_to, row.unit)}")

@@ -6,7 +6,8 @@ from syncline_design.report.choice_csv import optimization_csv
 from syncline_design.report.document import Document, Heading, Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.report.json_out import json_text
-from syncline_design.report.on_choice import figure_front, hinges_nodes, incomplete_lines
+from syncline_design.report.on_choice import figure_front, incomplete_lines
+from syncline_design.report.on_hinges import hinges_nodes
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.render_html import html
