@@ -27,3 +27,19 @@ def test_rows_that_are_cut_keep_what_lags_behind_them() -> None:
     place, turn = found(2.0)
     assert np.array_equal(place, 2.0 * path[[1, 4, 8]])
     assert np.array_equal(turn, 2.0 * turns[[1, 4, 8]])
+
+
+def test_what_a_log_does_not_know_stays_unknown_in_its_rows() -> None:
+    """A log says nothing of how the path bends between its rows; some of its rows neither."""
+    rng = np.random.default_rng(9)
+    unknown = ("start_s", "independent", "lagged", "pull", "twist")
+    names = [f.name for f in fields(StageRows) if f.name not in unknown]
+    whole = StageRows(**{n: rng.normal(size=(9, 3)) for n in names})
+    cut = cut_rows(whole, np.array([0, 5]))
+    assert len(cut) == 2
+    assert cut.pull is None
+    assert cut.twist is None
+    bent = replace(whole, pull=rng.normal(size=(9, 3)))
+    pulled = cut_rows(bent, np.array([0, 5])).pull
+    assert pulled is not None
+    assert np.array_equal(pulled, bent.pull[[0, 5]])

@@ -86,7 +86,8 @@ def cut_rows(rows: StageRows, index: Rows) -> StageRows:
     Elapsed time counts from the first row of what an effect is given, so the first row is kept.
     """
     kept = ("antenna_m", "ranging_m", "start_s", "independent", "lagged")
-    cut = {n: getattr(rows, n)[index] for n in StageRows.__slots__ if n not in kept}
+    every = {n: getattr(rows, n) for n in StageRows.__slots__ if n not in kept}
+    cut = {n: value[index] for n, value in every.items() if value is not None}
     behind = rows.lagged
     if behind is None:
         return replace(rows, **cut)
