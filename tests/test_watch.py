@@ -19,7 +19,9 @@ import syncline_design as sd
 from syncline_design.campaign.changes import REACH, Changes, weight_of
 from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
 from syncline_design.campaign.pool import pool_of
-from syncline_design.campaign.store import add_run
+from syncline_design.campaign.store import Stored, add_looks, add_run, read_store
+from syncline_design.campaign.watch_result import Watch
+from syncline_design.campaign.watching import Watching, WatchRequest
 from syncline_design.cli.app import app
 from syncline_design.diagnosis.sufficient import Less, Sufficient
 from syncline_design.diagnosis.system import pinned_system
@@ -105,7 +107,7 @@ def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
             # with one more variance where the scatter of runs or of their parts is larger
             other = density(null + column @ column.T)
             expected = np.log(weight_of(k + 1) / len(changes.terms)) + other - base
-            if changes.temper(6, c)[k - 1] == 1.0:
+            if changes.temper(6)[k - 1, c] == 1.0:
                 compared += 1
                 assert table[k - 1, c] == pytest.approx(expected, abs=1e-3)
             else:
@@ -189,6 +191,74 @@ def test_ten_days_ring_on_the_day_of_the_change(spec: Path, tmp_path: Path) -> N
     page = (tmp_path / "watch.html").read_text("utf-8")
     assert "fig-courses" in page
     assert "fig-evidence" in page
+
+
+def looked(spec: Path, store: Path) -> Stored:
+    """What `watch` keeps of its looks when it adds a run."""
+    stored = read_store(store)
+    assert stored is not None
+    return add_looks(stored, Watching(load(spec), WatchRequest(store), stored, 0).fresh)
+
+
+def counted(spec: Path, store: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[int, Watch]:
+    """How many looks are computed for an answer, and the answer."""
+    seen: list[int] = []
+    own = Changes.log_evidence
+
+    def counting(self: Changes, look: int) -> tuple[float, np.ndarray]:
+        seen.append(look)
+        return own(self, look)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Changes, "log_evidence", counting)
+        answer = Watching(load(spec), WatchRequest(store), read_store(store), 0).told(0)
+    return len(seen), answer
+
+
+def test_what_earlier_looks_found_is_kept(
+    spec: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Day by day is the same as all at once, by as many looks as days and not by their square."""
+    found = series(18, 12, np.array([9.0, 0, 0, 0, 0]) * BOUND, 8)
+    (tmp_path / "once").mkdir()
+    once = kept(spec, tmp_path / "once", [run_of(one, day) for day, one in enumerate(found)])
+    whole, fresh = counted(spec, once, monkeypatch)
+    days = tmp_path / "store.jsonl"
+    for day, one in enumerate(found):
+        add_run(days, "car", pinned_system(load(spec)), run_of(one, day))
+        computed, answer = counted(spec, days, monkeypatch)
+        looked(spec, days)
+        assert computed <= 4  # one kept, the new one, and two to say what changed
+    assert whole >= 11
+    assert [a.since.run for a in answer.alarms] == [a.since.run for a in fresh.alarms] == [9]
+    for own, other in zip(answer.runs[1:], fresh.runs[1:], strict=True):
+        assert own.e_value == pytest.approx(other.e_value, rel=1e-6)
+    # a run before the others is another history: all looks after it are computed again
+    late = replace(
+        run_of(series(18, 13, 0.0 * BOUND, 99)[12], 0), first_s=FIRST - DAY, sha256="f" * 64
+    )
+    add_run(days, "car", pinned_system(load(spec)), late)
+    computed, answer = counted(spec, days, monkeypatch)
+    assert computed >= 12
+    assert [a.since.file for a in answer.alarms] == ["day8.csv"]
+
+
+def test_a_look_that_its_runs_do_not_bear_out_is_not_believed(spec: Path, tmp_path: Path) -> None:
+    """In a chain made anew, too: every call computes one of the looks again."""
+    found = series(11, 8, np.array([9.0, 0, 0, 0, 0]) * BOUND, 6)
+    store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found)])
+    stored = looked(spec, store)
+    true = [*stored.looks.values()]
+    calm = [replace(one, log_evidence=-1.0) if k >= 6 else one for k, one in enumerate(true)]
+    assert true[-1].log_evidence > np.log(20.0)
+    add_looks(
+        stored, [replace(calm[0], log_evidence=-1.0), *calm[1:]]
+    )  # of 8 runs the first's turn
+    document = told(spec, store, tmp_path, 1)
+    assert "computed anew" in document["cautions"][0]
+    assert document["alarms"][0]["since"]["run"] == 7
+    looked(spec, store)  # the next run puts it right
+    assert not told(spec, store, tmp_path, 1)["cautions"]
 
 
 def test_an_accepted_change_is_the_new_baseline(spec: Path, tmp_path: Path) -> None:
@@ -290,6 +360,11 @@ def test_a_real_run_end_to_end(spec: Path, tmp_path: Path) -> None:
     for k in range(2):
         found = watch(store, own, tmp_path / f"run{k}.csv")
         assert found.exit_code == 0, found.output + found.stderr
+    kinds = [json.loads(line)["body"]["kind"] for line in store.read_text("utf-8").splitlines()]
+    assert kinds == ["store", "run", "looks", "run", "looks"]
+    before = store.read_bytes()
+    assert watch(store, own).exit_code == 0
+    assert store.read_bytes() == before  # who looks again leaves it as it is
     (tmp_path / "again.csv").write_bytes((tmp_path / "run1.csv").read_bytes() + b"\n")
     found = watch(store, own, tmp_path / "again.csv")
     assert found.exit_code == 2

@@ -22,6 +22,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.looks import Look
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -52,15 +53,41 @@ class Change:
     log_factor: float
 
 
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Terms of one size: where they stand among all, and their parameters (G, p)."""
+
+    terms: Index
+    index: Index
+
+    @property
+    def blocks(self) -> tuple[Index, Index]:
+        """Index of their own blocks in matrices (..., P, P)."""
+        return self.index[:, :, None], self.index[:, None, :]
+
+
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """All changes that runs could show, in their order."""
+    """All changes that runs could show, in their order.
+
+    kept: what looks at the first of these runs found, so that none of it is computed again.
+    """
 
     pool: Pool
+    kept: tuple[Look, ...] = ()
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         return self.pool.terms
+
+    @cached_property
+    def groups(self) -> tuple[Group, ...]:
+        """The terms by size: small matrices of one size are worked on at once."""
+        sizes = sorted({term.size for term in self.terms})
+        places = [[k for k, t in enumerate(self.terms) if t.size == size] for size in sizes]
+        return tuple(
+            Group(np.array(own), np.array([self.terms[k].index for k in own])) for own in places
+        )
 
     @cached_property
     def prior(self) -> Array:
@@ -72,95 +99,141 @@ class Changes:
 
     @cached_property
     def within(self) -> Array:
-        """Variance by the scatter of parts over that fitted, of every run and effect, (L, C).
+        """Variance by the scatter of parts over that fitted, of every run and effect, (L, C)."""
+        known = [np.array(look.within) for look in self.kept[: self.pool.count]]
+        rest = [self.within_of(run) for run in range(len(known), self.pool.count)]
+        return np.array([*known, *rest]).reshape(self.pool.count, len(self.terms))
+
+    def within_of(self, run: int) -> Array:
+        """The same of one run, (C,).
 
         Of each effect alone, the others where the run itself puts them: what acts all along would
         else be taken for scatter.
         """
-        found = np.ones((self.pool.count, len(self.terms)))
-        for run, less in enumerate(self.pool.less):
-            values = _values(self.pool.normal[run] + np.diag(self.prior), self.pool.score[run])
-            for part in less:
-                left = part.score - part.normal @ values
-                for c, term in enumerate(self.terms):
-                    own = _scatter(self.pool.normal[run], part.normal, left, term.index)
-                    found[run, c] = own if part is less[0] else max(found[run, c], own)
-        return found
+        less = self.pool.less[run]
+        if not less:
+            return np.ones(len(self.terms))
+        values = _values(self.pool.normal[run] + np.diag(self.prior), self.pool.score[run])
+        lefts = [(part.normal, part.score - part.normal @ values) for part in less]
+        scatter = [
+            [_scatter(self.pool.normal[run], *left, term.index) for term in self.terms]
+            for left in lefts
+        ]
+        return np.asarray(np.max(scatter, axis=0))
 
     def log_evidence(self, look: int) -> tuple[float, Array]:
         """log E_n of the first `look` runs, and log w_k B_ck / C of every k from 1 and c."""
         weights = np.array([weight_of(k + 1) for k in range(1, look)])
-        factors = [self._factors(look, c) for c in range(len(self.terms))]
-        table = np.log(weights)[:, None] + np.stack(factors, axis=1) - np.log(len(self.terms))
+        table = np.log(weights)[:, None] + self._factors(look) - np.log(len(self.terms))
         rest = max(1.0 - float(np.sum(weights)), 1e-300)
         return float(np.logaddexp.reduce([*table.ravel(), np.log(rest)])), table
 
-    def _factors(self, look: int, c: int) -> Array:
-        """log B_ck of every k from 1."""
-        term = self.terms[c]
-        whole, score = self._freed(look)
-        temper = self.temper(look, c)
-        normal = whole[:, term.index[:, None], term.index] / temper[:, None, None]
-        return _log_bayes(normal, score[:, term.index] / temper[:, None], self._reach(look, term))
+    @cached_property
+    def course(self) -> Array:
+        """log E_n after each look, from the first run on, after which nothing can have changed."""
+        known = [look.log_evidence for look in self.kept[: self.pool.count]]
+        rest = range(len(known) + 1, self.pool.count + 1)
+        return np.array([*known, *(0.0 if n < 2 else self.log_evidence(n)[0] for n in rest)])
+
+    def found_by(self, look: int) -> tuple[float, Array, Array]:
+        """What is kept of a look: log E_n, scatter within its last run, scatter of its runs."""
+        return float(self.course[look - 1]), self.within[look - 1], self.between[look - 1]
+
+    def found_anew(self, look: int) -> tuple[float, Array, Array]:
+        """The same, by the runs and by what is kept of the looks before it."""
+        evidence = self.log_evidence(look)[0] if look > 1 else 0.0
+        return evidence, self.within_of(look - 1), self.between_of(look)
+
+    def _factors(self, look: int) -> Array:
+        """log B_ck of every k from 1 and c, (look - 1, C)."""
+        found = np.zeros((look - 1, len(self.terms)))
+        temper = self.temper(look)
+        for group, normal, score in zip(self.groups, *self._freed(look), strict=True):
+            own = temper[:, group.terms]
+            found[:, group.terms] = _log_bayes(
+                normal / own[:, :, None, None], score / own[:, :, None], self._reach(look, group)
+            )
+        return found
 
     def change(self, look: int, k: int, c: int) -> Change:
         """Effect c from run k on, by the first `look` runs."""
-        term = self.terms[c]
-        whole, score = self._freed(look)
-        inverse = inverted(whole[k - 1][term.index[:, None], term.index])
-        covariance = float(self.temper(look, c)[k - 1]) * inverse
-        log_factor = float(self._factors(look, c)[k - 1])
-        return Change(term, k, inverse @ score[k - 1][term.index], covariance, log_factor)
+        group, at = next(
+            (g, int(np.flatnonzero(own.terms == c)[0]))
+            for g, own in enumerate(self.groups)
+            if c in own.terms
+        )
+        normal, score = (found[group][k - 1, at] for found in self._freed(look))
+        inverse = inverted(normal)
+        covariance = float(self.temper(look)[k - 1, c]) * inverse
+        log_factor = float(self._factors(look)[k - 1, c])
+        return Change(self.terms[c], k, inverse @ score, covariance, log_factor)
 
     @cached_property
-    def _kept(self) -> dict[int, tuple[Array, Array]]:
+    def _last(self) -> dict[int, tuple[list[Array], list[Array]]]:
         return {}
 
-    def _freed(self, look: int) -> tuple[Array, Array]:
-        """N (look - 1, P, P) and s (look - 1, P) of all parameters, of every k from 1."""
-        if look not in self._kept:
-            self._kept.clear()
-            normal, score = self.pool.normal[:look], self.pool.score[:look]
-            total = normal.sum(axis=0) + np.diag(self.prior)
-            scale = np.sqrt(np.where(np.diag(total) > 0.0, np.diag(total), 1.0))
-            inverse = np.linalg.pinv(total / scale[:, None] / scale, hermitian=True, rcond=1e-13)
-            inverse = inverse / scale[:, None] / scale
-            later = np.cumsum(normal[::-1], axis=0)[::-1][1:]
-            scores = np.cumsum(score[::-1], axis=0)[::-1][1:]
-            cross = later @ inverse
-            self._kept[look] = later - cross @ later, scores - cross @ score.sum(axis=0)
-        return self._kept[look]
+    def _freed(self, look: int) -> tuple[list[Array], list[Array]]:
+        """N (look - 1, G, p, p) and s (look - 1, G, p) of every k from 1, by group of terms."""
+        if look in self._last:
+            return self._last[look]
+        normal, score = self.pool.normal[:look], self.pool.score[:look]
+        inverse = _pseudo_inverse(normal.sum(axis=0) + np.diag(self.prior))
+        later = np.cumsum(normal[::-1], axis=0)[::-1][1:]
+        scores = np.cumsum(score[::-1], axis=0)[::-1][1:]
+        cross = later @ inverse
+        freed = scores - cross @ score.sum(axis=0)
+        normals = [
+            later[:, *g.blocks] - cross[:, g.index] @ np.swapaxes(later[:, g.index], -1, -2)
+            for g in self.groups
+        ]
+        self._last.clear()
+        self._last[look] = normals, [freed[:, g.index] for g in self.groups]
+        return self._last[look]
 
-    def _reach(self, look: int, term: Term) -> Array:
-        """D: REACH^2 times the covariance that one run has, by how the runs were driven."""
-        index = term.index[:, None], term.index
-        return REACH**2 * inverted(self.pool.normal[:look].mean(axis=0)[index])
+    def _reach(self, look: int, group: Group) -> Array:
+        """D (G, p, p): REACH^2 times one run's covariance, by how the runs were driven."""
+        return REACH**2 * inverted(self.pool.normal[:look].mean(axis=0)[group.blocks])
 
-    def temper(self, look: int, c: int) -> Array:
-        """Variance over that fitted: within runs, and between those before each k from 1."""
-        inside = max(1.0, float(np.mean(self.within[:look, c])))
-        return inside * np.maximum(1.0, self._between[: look - 1, c])
+    def temper(self, look: int) -> Array:
+        """Variance over that fitted, of every k from 1 and c: within, and between runs before."""
+        inside = np.maximum(1.0, self.within[:look].mean(axis=0))
+        return np.asarray(inside * np.maximum(1.0, self.between[: look - 1]))
 
     @cached_property
-    def _between(self) -> Array:
-        """Scatter of the runs before k over what it is by chance, of k from 1 and c.
+    def between(self) -> Array:
+        """Scatter of the first k runs over what it is by chance, of k from 1 and c, (L, C)."""
+        known = [np.array(look.between) for look in self.kept[: self.pool.count]]
+        rest = [self.between_of(k) for k in range(len(known) + 1, self.pool.count + 1)]
+        return np.array([*known, *rest]).reshape(self.pool.count, len(self.terms))
+
+    def between_of(self, k: int) -> Array:
+        """The same of one k, (C,).
 
         Cochran's Q of each effect alone, the values of all others those of these runs together.
         """
-        count, found = self.pool.count, np.ones((max(self.pool.count - 1, 1), len(self.terms)))
-        inverses = [inverted(self.pool.normal[:, t.index[:, None], t.index]) for t in self.terms]
-        for k in range(2, count):
-            normal, score = self.pool.normal[:k], self.pool.score[:k]
-            values = _values(normal.sum(axis=0) + np.diag(self.prior), score.sum(axis=0))
-            left = score - normal @ values
-            for c, term in enumerate(self.terms):
-                own = left[:, term.index]
-                square = float(np.einsum("ra,rab,rb->", own, inverses[c][:k], own))
-                free = term.size * (k - 1.0)
-                known = term.size * RUNS_KNOWN
-                inside = max(1.0, float(np.mean(self.within[:k, c])))
-                found[k - 1, c] = (square / inside + known) / (free + known)
+        found = np.ones(len(self.terms))
+        if k < 2:
+            return found
+        total, score = (sums[k - 1] for sums in self._sums)
+        left = self.pool.score[:k] - self.pool.normal[:k] @ _values(total, score)
+        within = np.maximum(1.0, self.within[:k].mean(axis=0))
+        for g, inverse in zip(self.groups, self._inverses, strict=True):
+            own, size = left[:, g.index], g.index.shape[1]
+            square = np.einsum("rga,rgab,rgb->g", own, inverse[:k], own)
+            free, known = size * (k - 1.0), size * RUNS_KNOWN
+            found[g.terms] = (square / within[g.terms] + known) / (free + known)
         return found
+
+    @cached_property
+    def _sums(self) -> tuple[Array, Array]:
+        """Information with the prior, and score, of the first k runs together, k from 1."""
+        totals = np.cumsum(self.pool.normal, axis=0) + np.diag(self.prior)
+        return totals, np.cumsum(self.pool.score, axis=0)
+
+    @cached_property
+    def _inverses(self) -> tuple[Array, ...]:
+        """Covariances of each effect alone by each run, (L, G, p, p), by group of terms."""
+        return tuple(inverted(self.pool.normal[:, *g.blocks]) for g in self.groups)
 
     def without(self, one: Change) -> Changes:
         """The same runs with a change taken off those that have it."""
@@ -175,9 +248,16 @@ class Changes:
 
 def _values(total: Array, score: Array) -> Array:
     """total^-1 score, columns scaled alike first."""
-    scale = np.sqrt(np.where(np.diag(total) > 0.0, np.diag(total), 1.0))
-    scaled = total / scale[:, None] / scale
-    found: Array = np.linalg.lstsq(scaled, score / scale, rcond=1e-13)[0] / scale
+    found: Array = _pseudo_inverse(total) @ score
+    return found
+
+
+def _pseudo_inverse(total: Array) -> Array:
+    """total^-1 (..., P, P), columns scaled alike first."""
+    size = np.diagonal(total, axis1=-2, axis2=-1)
+    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    squares = scale[..., :, None] * scale[..., None, :]
+    found: Array = np.linalg.pinv(total / squares, hermitian=True, rcond=1e-13) / squares
     return found
 
 
@@ -195,12 +275,17 @@ def _scatter(normal: Array, normals: Array, scores: Array, index: Index) -> floa
 
 
 def _log_bayes(normal: Array, score: Array, reach: Array) -> Array:
-    """log |1 + N D|^-1/2 exp(s' (N + D^-1)^-1 s / 2) of several N and s; D may have no inverse."""
+    """log |1 + N D|^-1/2 exp(s' (N + D^-1)^-1 s / 2) of N (n, G, p, p), s (n, G, p) and D
+    (G, p, p), which may have no inverse."""
     values, vectors = np.linalg.eigh(reach)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    inner = np.eye(len(reach)) + root.T @ normal @ root
-    turned = score @ root
-    size = np.linalg.slogdet(inner)[1]
-    solved = np.linalg.solve(inner, turned[:, :, None])[:, :, 0]
-    found: Array = np.minimum(0.5 * np.sum(turned * solved, axis=1) - 0.5 * size, MOST_LOG)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    inner = np.eye(reach.shape[-1]) + np.swapaxes(root, -1, -2) @ normal @ root
+    turned = (score[:, :, None, :] @ root)[:, :, 0, :]
+    if reach.shape[-1] == 1:
+        size, square = np.log(inner[..., 0, 0]), turned[..., 0] ** 2 / inner[..., 0, 0]
+    else:
+        size = np.linalg.slogdet(inner)[1]
+        solved = np.linalg.solve(inner, turned[..., None])[..., 0]
+        square = np.sum(turned * solved, axis=-1)
+    found: Array = np.minimum(0.5 * square - 0.5 * size, MOST_LOG)
     return found

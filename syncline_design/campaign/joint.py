@@ -87,9 +87,9 @@ def diagnose_joint(
             start = None if request.starts is None else request.starts[k]
             _demand_unlike(run, entries, path)
             if request.store is not None:
-                add_run(request.store, case.spec.name, system, run, start)
+                add_run(request.store, case.spec.name, system, run, start, stored)
             number = len(entries) + 1
-            entries.append(Entry(number, start or f"#{number}", run))
+            entries.append(Entry(number, start or f"#{number}", run, run.statistics()))
         progress("taking the logs together", 1.0)
         return _together(case, request, settings, stored, entries, before)
 
@@ -102,11 +102,11 @@ def _together(
     entries: Sequence[Entry],
     before: int,
 ) -> Diagnosis:
-    pool = pool_of([one.run.statistics() for one in entries], [one.start for one in entries])
+    pool = pool_of([one.found for one in entries], [one.start for one in entries])
     named = Naming(
         pool, settings.false_alarm_rate, settings.max_effects, settings.exclude_effects
     ).named()
-    last = None if request.store is None else read_store(request.store)
+    last = None if request.store is None else read_store(request.store, stored)
     return tell(Told(case, settings, tuple(entries), before, pool, named,
                      last, 0 if stored is None else stored.torn))  # fmt: skip
 

@@ -83,12 +83,16 @@ class NamedTogether:
 
 @dataclass(frozen=True, eq=False)
 class Naming:
-    """One search over a pool.  excluded: effects that must not be used."""
+    """One search over a pool.
+
+    excluded: effects that must not be used.  whole: the scopes that are looked for.
+    """
 
     pool: Pool
     rate: float
     most: int
     excluded: tuple[str, ...] = ()
+    whole: tuple[Scope, ...] = ("build", "start", "log")
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -101,7 +105,9 @@ class Naming:
         found: list[Scope] = ["build"]
         if 1 < starts < self.pool.count:
             found.append("start")
-        return (*found, "log") if self.pool.count > 1 else tuple(found)
+        if self.pool.count > 1:
+            found.append("log")
+        return tuple(one for one in found if one in self.whole)
 
     def charge(self, scope: Scope) -> float:
         """log of how often chance was given a try."""

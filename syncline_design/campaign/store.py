@@ -1,5 +1,7 @@
 """The runs of one system on disk: a file of lines that only grows, each bound to all before it.
 
+Lines are runs, baselines, and what looks at the runs found (`looks`).
+
 A line is {"previous": P, "sha256": H, "body": B}; P is the H of the line before (64 zeros at the
 start), H the SHA-256 of P and of B in canonical JSON.  A line that was changed, taken out, put in
 or moved breaks the chain, and the store is refused as damaged.  A last line without its end is what
@@ -13,14 +15,17 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Final
 
 from syncline_design import __version__
 from syncline_design.campaign.kept import Run
+from syncline_design.campaign.looks import Look
 from syncline_design.campaign.packing import PackingError
 from syncline_design.campaign.same_system import description, differences
+from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.machine.appended_files import append_line, whole_lines
 from syncline_design.machine.input_files import UnsuitableError, read_plain
 from syncline_design.machine.quick_dataclass import dataclass
@@ -37,11 +42,16 @@ MOST_DIFFERENCES: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A run in the store: its number from 1, and the start of the system that it belongs to."""
+    """A run in the store: its number from 1, and the start of the system that it belongs to.
+
+    found: its statistics unpacked.  line: hash of its line, empty where it is in no store.
+    """
 
     number: int
     start: str
     run: Run
+    found: Sufficient
+    line: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +59,8 @@ class Stored:
     """A store that was read.
 
     system: what it is a store of (`same_system.description`).  baselines: after how many runs a
-    new baseline was set.  torn: bytes of a last line that a kill left without its end.
-    last: hash of the last line.
+    new baseline was set.  looks: what looks found, by their keys.  torn: bytes of a last line that
+    a kill left without its end.  last: hash of the last line.  content: all whole lines.
     """
 
     path: Path
@@ -58,16 +68,21 @@ class Stored:
     system: Any
     entries: tuple[Entry, ...]
     baselines: tuple[int, ...]
+    looks: Mapping[str, Look]
     torn: int
     last: str
+    content: bytes = field(repr=False)
 
     @property
     def runs(self) -> tuple[Run, ...]:
         return tuple(one.run for one in self.entries)
 
 
-def read_store(path: Path) -> Stored | None:
-    """The store in a file; None where there is no file yet.  BadInput where it is damaged."""
+def read_store(path: Path, known: Stored | None = None) -> Stored | None:
+    """The store in a file; None where there is no file yet.  BadInput where it is damaged.
+
+    known: the same store as it was read before: what is the same, byte for byte, is not read anew.
+    """
     try:
         content = read_plain(path, MOST_BYTES)
     except FileNotFoundError:
@@ -75,30 +90,40 @@ def read_store(path: Path) -> Stored | None:
     except (OSError, UnsuitableError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise refused(path, f"cannot read the store: {reason}") from None
-    return _stored(path, content)
+    return _stored(path, content, known)
 
 
-def _stored(path: Path, content: bytes) -> Stored | None:
+def _stored(path: Path, content: bytes, known: Stored | None) -> Stored | None:
     kept = whole_lines(content)
     torn = len(content) - len(kept)
     if torn and not kept and not content.startswith(b'{"previous"'):
         raise refused(path, "no store", "a file that `watch` or `diagnose --joint --store` made", 1)
+    first, rest = 1, kept
     name, system, last = "", None, START
     entries: list[Entry] = []
     baselines: list[int] = []
-    for line, text in enumerate(kept.splitlines(), 1):
+    looks: dict[str, Look] = {}
+    if known is not None and kept.startswith(known.content):
+        first, rest = 1 + known.content.count(b"\n"), kept[len(known.content) :]
+        name, system, last = known.name, known.system, known.last
+        entries, baselines = list(known.entries), list(known.baselines)
+        looks = dict(known.looks)
+    for line, text in enumerate(rest.splitlines(), first):
         body, last = _checked(path, line, text, last)
+        kind = body.get("kind")
         if line == 1:
             name, system = _head(path, body)
-        elif body.get("kind") == "run":
-            entries.append(_entry(path, line, body, len(entries) + 1))
-        elif body.get("kind") == "baseline":
+        elif kind == "run":
+            entries.append(_entry(path, line, body, len(entries) + 1, last))
+        elif kind == "baseline":
             baselines.append(len(entries))
+        elif kind == "looks":
+            looks |= _looks(path, line, body)
         else:
-            raise refused(path, f"a line of kind {body.get('kind')!r}", "run or baseline", line)
+            raise refused(path, f"a line of kind {kind!r}", "run, baseline or looks", line)
     if system is None:
         return None  # nothing but what a kill left of the first line
-    return Stored(path, name, system, tuple(entries), tuple(baselines), torn, last)
+    return Stored(path, name, system, tuple(entries), tuple(baselines), looks, torn, last, kept)
 
 
 def _checked(path: Path, line: int, text: bytes, previous: str) -> tuple[dict[str, Any], str]:
@@ -131,14 +156,25 @@ def _head(path: Path, body: dict[str, Any]) -> tuple[str, Any]:
     return str(body.get("name", "")), body.get("system")
 
 
-def _entry(path: Path, line: int, body: dict[str, Any], number: int) -> Entry:
+def _entry(path: Path, line: int, body: dict[str, Any], number: int, own: str) -> Entry:
     try:
         run = read_as(Run, json.dumps(body["run"]))
-        run.statistics()
-        return Entry(number, str(body["start"]), run)
+        return Entry(number, str(body["start"]), run, run.statistics(), own)
     except (NotThisResultError, PackingError, KeyError) as error:
-        first = (str(error).splitlines() or [""])[0]
-        raise refused(path, f"damaged: a run that cannot be read ({first})", "", line) from None
+        raise _unreadable(path, line, "a run", error) from None
+
+
+def _looks(path: Path, line: int, body: dict[str, Any]) -> dict[str, Look]:
+    try:
+        found = [read_as(Look, json.dumps(one)) for one in body["looks"]]
+    except (NotThisResultError, KeyError, TypeError) as error:
+        raise _unreadable(path, line, "looks", error) from None
+    return {one.key: one for one in found}
+
+
+def _unreadable(path: Path, line: int, what: str, error: Exception) -> BadInput:
+    first = (str(error).splitlines() or [""])[0]
+    return refused(path, f"damaged: {what} that cannot be read ({first})", "", line)
 
 
 def demand_system(stored: Stored, system: System, spec: str) -> None:
@@ -178,14 +214,21 @@ def demand_new(stored: Stored | None, run: Run, path: Path) -> None:
             raise _twice(path, ", ".join(run.files), one)
 
 
-def add_run(path: Path, name: str, system: System, run: Run, start: str | None = None) -> None:
+def add_run(
+    path: Path,
+    name: str,
+    system: System,
+    run: Run,
+    start: str | None = None,
+    known: Stored | None = None,
+) -> None:
     """Append a run; the first one makes the store.  start: None for a start of its own.
 
-    What another process appended meanwhile is looked at again.
+    What another process appended meanwhile is looked at again.  known: the store as it was read.
     """
 
     def lines(kept: bytes) -> bytes:
-        stored = _stored(path, kept) if kept else None
+        stored = _stored(path, kept, known) if kept else None
         last, text = START, b""
         if stored is None:
             head = {"kind": "store", "schema": SCHEMA, "name": name, "version": __version__,
@@ -206,12 +249,27 @@ def add_baseline(path: Path) -> None:
     """Append that the runs so far are done with: what comes is held against what comes."""
 
     def line(kept: bytes) -> bytes:
-        stored = _stored(path, kept)
+        stored = _stored(path, kept, None)
         if stored is None:
             raise refused(path, "no store to accept", "a store with runs")
         return _line(stored.last, {"kind": "baseline", "after": len(stored.entries)})[0]
 
     append_line(path, line)
+
+
+def add_looks(known: Stored, looks: Sequence[Look]) -> Stored:
+    """Append what looks found; the store with it."""
+
+    def line(kept: bytes) -> bytes:
+        stored = _stored(known.path, kept, known)
+        if stored is None:
+            raise refused(known.path, "the store was taken away meanwhile", "a store with runs")
+        return _line(stored.last, {"kind": "looks", "looks": [one.to_json() for one in looks]})[0]
+
+    append_line(known.path, line)
+    found = read_store(known.path, known)
+    assert found is not None
+    return found
 
 
 def _line(previous: str, body: dict[str, Any]) -> tuple[bytes, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -14,12 +15,14 @@ from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.changes import Change, Changes
 from syncline_design.campaign.joint import JointError
+from syncline_design.campaign.looks import Look, keys_of, known_first
 from syncline_design.campaign.naming import Naming
-from syncline_design.campaign.pool import Pool, Scoped, Term, fitted, inverted, pool_of
+from syncline_design.campaign.pool import Pool, Term, fitted, inverted, pool_of
 from syncline_design.campaign.store import (
     Entry,
     Stored,
     add_baseline,
+    add_looks,
     add_run,
     by_date,
     demand_known,
@@ -94,13 +97,16 @@ def watch(
         before = 0 if stored is None else len(stored.entries)
         if request.files:
             _add(case, request, stored, settings or DiagnosisSettings(), progress)
-            stored = read_store(request.store)
+            stored = read_store(request.store, stored)
         if stored is None or not stored.entries:
             raise JointError(f"{request.store}: no runs yet; expected a FILE to add, or a store "
                              "with runs")  # fmt: skip
         in_force().doing("comparing the runs")
         progress("comparing the runs", 0.9)
-        return _Watching(case, request, stored, before).told(torn)
+        found = Watching(case, request, stored, before)
+        if request.files and found.fresh:  # whoever only looks again leaves the store as it is
+            found = replace(found, stored=add_looks(stored, found.fresh))
+        return found.told(torn)
 
 
 def accept(store: Path) -> Stored:
@@ -126,7 +132,7 @@ def _add(
     progress("reading the run", 0.0)
     run = run_of(case, request.files, settings, promise_of(case), progress)
     demand_new(stored, run, request.store)
-    add_run(request.store, case.spec.name, pinned_system(case), run)
+    add_run(request.store, case.spec.name, pinned_system(case), run, known=stored)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +148,7 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class _Watching:
+class Watching:
     """A store looked at."""
 
     case: Case
@@ -159,16 +165,46 @@ class _Watching:
     @cached_property
     def pool(self) -> Pool:
         entries = self.ordered or self.stored.entries[-1:]
-        return pool_of([e.run.statistics() for e in entries], [e.start for e in entries])
+        return pool_of([e.found for e in entries], [e.start for e in entries])
+
+    @property
+    def course(self) -> Array:
+        """log E_n after each look, from the second run on."""
+        return self.changes.course[1:]
 
     @cached_property
-    def course(self) -> tuple[float, ...]:
-        """log E_n after each look, from the second run on."""
-        return tuple(self.changes.log_evidence(n)[0] for n in range(2, len(self.ordered) + 1))
+    def keys(self) -> tuple[str, ...]:
+        """Of the look after each run."""
+        listed = [self.pool.labels, [term.label for term in self.pool.terms]]
+        return tuple(keys_of(listed, [entry.line for entry in self.ordered]))
+
+    @cached_property
+    def kept(self) -> tuple[Look, ...]:
+        """What earlier looks at these runs found, as the store holds it."""
+        return known_first(self.stored.looks, self.keys, len(self.pool.terms))
+
+    @cached_property
+    def doubted(self) -> int | None:
+        """The run after which a kept look says what its runs do not; None where none does.
+
+        At every call another of them is computed again.
+        """
+        if not self.kept:
+            return None
+        at = len(self.stored.entries) % len(self.kept)
+        anew = _look(self.keys[at], *Changes(self.pool, self.kept).found_anew(at + 1))
+        return None if anew.is_like(self.kept[at]) else at
 
     @cached_property
     def changes(self) -> Changes:
-        return Changes(self.pool)
+        return Changes(self.pool, self.kept if self.doubted is None else ())
+
+    @cached_property
+    def fresh(self) -> tuple[Look, ...]:
+        """Looks that the store does not hold, or holds wrongly."""
+        first = len(self.kept) if self.doubted is None else 0
+        places = range(first, len(self.ordered))
+        return tuple(_look(self.keys[k], *self.changes.found_by(k + 1)) for k in places)
 
     @property
     def threshold(self) -> float:
@@ -200,7 +236,7 @@ class _Watching:
         alarms = [a for one in self.seen for a in self._alarms(one)]
         alarms += self._conventions()
         dated = all(e.run.date is not None for e in self.ordered)
-        last = self.course[-1] if self.course else None
+        last = float(self.course[-1]) if len(self.course) else None
         return Watch(
             verdict="alarm" if alarms else "unchanged",
             spec=SpecRead(case.spec.name, str(case.path)),
@@ -274,7 +310,7 @@ class _Watching:
     def _runs(self) -> Iterator[WatchedRun]:
         """Every run of every baseline, with what it tells alone beside what is named."""
         place = {e.number: k for k, e in enumerate(self.ordered)}
-        values = _values(self.pool)
+        values = _values(self.pool, self.changes.within)
         for entry in self.stored.entries:
             k = place.get(entry.number)
             known = None if k is None or k == 0 else self.course[k - 1]
@@ -305,9 +341,15 @@ class _Watching:
         )
 
     def _cautions(self) -> Iterator[str]:
-        """What is odd in the last run, and no change of an effect."""
+        """What is odd in the last run or in the store, and no change of an effect."""
         if not self.ordered:
             return
+        if self.doubted is not None:
+            number = self.ordered[self.doubted].number
+            yield (
+                f"what the store kept of the look after run {number} is not what its runs say: "
+                "all looks were computed anew from the runs"
+            )
         *earlier, last = self.ordered
         run = last.run
         if run.left_material:
@@ -343,23 +385,23 @@ def _best(changes: Changes, look: int, table: Array, first: int, total: float) -
                 total, tuple(others))  # fmt: skip
 
 
-def _values(pool: Pool) -> list[list[tuple[Term, int, float, float | None]]]:
+def _look(key: str, evidence: float, within: Array, between: Array) -> Look:
+    return Look(key, evidence, tuple(map(float, within)), tuple(map(float, between)))
+
+
+def _values(pool: Pool, within: Array) -> list[list[tuple[Term, int, float, float | None]]]:
     """Each effect's parameters by every run alone, beside what all runs name together."""
-    named = Naming(pool, RATE, 4).named().fit
-    within = Changes(pool).within
+    named = Naming(pool, RATE, 4, whole=("build",)).named().fit
     found: list[list[tuple[Term, int, float, float | None]]] = [[] for _ in range(pool.count)]
     for c, term in enumerate(pool.terms):
         rest = tuple(s for s in named.scoped if s.term.label != term.label)
-        beside = fitted(pool, tuple(Scoped(s.term, "build") for s in rest))
-        index = term.index[:, None], term.index
-        temper = max(1.0, float(np.mean(within[:, c])))
-        for run in range(pool.count):
-            at, of = beside.columns(run)
-            left = pool.score[run] - pool.normal[run][:, of] @ beside.values[at]
-            inverse = inverted(pool.normal[run][index])
-            values = inverse @ left[term.index]
-            for k in range(term.size):
-                size = float(inverse[k, k])
-                spread = math.sqrt(temper * size) if size > 0.0 else None
-                found[run].append((term, k, float(values[k]), spread))
+        beside = fitted(pool, rest)
+        at, of = beside.columns(0)  # one value in all runs: the same columns in every one
+        left = pool.score - pool.normal[:, :, of] @ beside.values[at]
+        inverse = inverted(pool.normal[:, term.index[:, None], term.index])
+        values = (inverse @ left[:, term.index, None])[:, :, 0]
+        spread = np.sqrt(max(1.0, float(np.mean(within[:, c]))) * np.einsum("rkk->rk", inverse))
+        for run, k in np.ndindex(values.shape):
+            own = float(spread[run, k])
+            found[run].append((term, k, float(values[run, k]), own if own > 0.0 else None))
     return found
