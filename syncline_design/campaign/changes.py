@@ -22,7 +22,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.looks import Look
+from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -74,7 +74,7 @@ class Changes:
     """
 
     pool: Pool
-    kept: tuple[Look, ...] = ()
+    kept: tuple[KeptLook, ...] = ()
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:

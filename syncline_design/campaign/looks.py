@@ -22,7 +22,7 @@ ALIKE: Final = 1e-3  # nat, and of a variance: more than what another machine ro
 
 
 @dataclass(frozen=True, slots=True)
-class Look(Record):
+class KeptLook(Record):
     """What a look found: log of the evidence [nat], by effect the scatter within its last run, and
     that of all its runs, over what they are by chance."""
 
@@ -31,7 +31,7 @@ class Look(Record):
     within: tuple[float, ...]
     between: tuple[float, ...]
 
-    def is_like(self, other: Look) -> bool:
+    def is_like(self, other: KeptLook) -> bool:
         """Whether both say the same but for rounding."""
         pairs = zip(self._figures(), other._figures(), strict=False)
         same = len(self.within) == len(other.within) and len(self.between) == len(other.between)
@@ -49,7 +49,9 @@ def keys_of(terms: Sequence[Any], runs: Sequence[str]) -> Iterator[str]:
         yield last
 
 
-def known_first(kept: Mapping[str, Look], keys: Sequence[str], effects: int) -> tuple[Look, ...]:
+def known_first(
+    kept: Mapping[str, KeptLook], keys: Sequence[str], effects: int
+) -> tuple[KeptLook, ...]:
     """The looks that are kept, as far as none is missing before them."""
     found = []
     for key in keys:

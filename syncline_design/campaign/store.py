@@ -22,7 +22,7 @@ from typing import Any, Final
 
 from syncline_design import __version__
 from syncline_design.campaign.kept import Run
-from syncline_design.campaign.looks import Look
+from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.packing import PackingError
 from syncline_design.campaign.same_system import description, differences
 from syncline_design.diagnosis.sufficient import Sufficient
@@ -68,7 +68,7 @@ class Stored:
     system: Any
     entries: tuple[Entry, ...]
     baselines: tuple[int, ...]
-    looks: Mapping[str, Look]
+    looks: Mapping[str, KeptLook]
     torn: int
     last: str
     content: bytes = field(repr=False)
@@ -102,7 +102,7 @@ def _stored(path: Path, content: bytes, known: Stored | None) -> Stored | None:
     name, system, last = "", None, START
     entries: list[Entry] = []
     baselines: list[int] = []
-    looks: dict[str, Look] = {}
+    looks: dict[str, KeptLook] = {}
     if known is not None and kept.startswith(known.content):
         first, rest = 1 + known.content.count(b"\n"), kept[len(known.content) :]
         name, system, last = known.name, known.system, known.last
@@ -164,9 +164,9 @@ def _entry(path: Path, line: int, body: dict[str, Any], number: int, own: str) -
         raise _unreadable(path, line, "a run", error) from None
 
 
-def _looks(path: Path, line: int, body: dict[str, Any]) -> dict[str, Look]:
+def _looks(path: Path, line: int, body: dict[str, Any]) -> dict[str, KeptLook]:
     try:
-        found = [read_as(Look, json.dumps(one)) for one in body["looks"]]
+        found = [read_as(KeptLook, json.dumps(one)) for one in body["looks"]]
     except (NotThisResultError, KeyError, TypeError) as error:
         raise _unreadable(path, line, "looks", error) from None
     return {one.key: one for one in found}
@@ -257,7 +257,7 @@ def add_baseline(path: Path) -> None:
     append_line(path, line)
 
 
-def add_looks(known: Stored, looks: Sequence[Look]) -> Stored:
+def add_looks(known: Stored, looks: Sequence[KeptLook]) -> Stored:
     """Append what looks found; the store with it."""
 
     def line(kept: bytes) -> bytes:

@@ -15,7 +15,7 @@ from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.changes import Change, Changes
 from syncline_design.campaign.joint import JointError
-from syncline_design.campaign.looks import Look, keys_of, known_first
+from syncline_design.campaign.looks import KeptLook, keys_of, known_first
 from syncline_design.campaign.naming import Naming
 from syncline_design.campaign.pool import Pool, Term, fitted, inverted, pool_of
 from syncline_design.campaign.store import (
@@ -179,7 +179,7 @@ class Watching:
         return tuple(keys_of(listed, [entry.line for entry in self.ordered]))
 
     @cached_property
-    def kept(self) -> tuple[Look, ...]:
+    def kept(self) -> tuple[KeptLook, ...]:
         """What earlier looks at these runs found, as the store holds it."""
         return known_first(self.stored.looks, self.keys, len(self.pool.terms))
 
@@ -200,7 +200,7 @@ class Watching:
         return Changes(self.pool, self.kept if self.doubted is None else ())
 
     @cached_property
-    def fresh(self) -> tuple[Look, ...]:
+    def fresh(self) -> tuple[KeptLook, ...]:
         """Looks that the store does not hold, or holds wrongly."""
         first = len(self.kept) if self.doubted is None else 0
         places = range(first, len(self.ordered))
@@ -385,8 +385,8 @@ def _best(changes: Changes, look: int, table: Array, first: int, total: float) -
                 total, tuple(others))  # fmt: skip
 
 
-def _look(key: str, evidence: float, within: Array, between: Array) -> Look:
-    return Look(key, evidence, tuple(map(float, within)), tuple(map(float, between)))
+def _look(key: str, evidence: float, within: Array, between: Array) -> KeptLook:
+    return KeptLook(key, evidence, tuple(map(float, within)), tuple(map(float, between)))
 
 
 def _values(pool: Pool, within: Array) -> list[list[tuple[Term, int, float, float | None]]]:
