@@ -18,6 +18,7 @@ from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.limits import Beyond
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
+from syncline_design.diagnosis.noise_split import NoiseFactors
 from syncline_design.diagnosis.result import (
     Check,
     Diagnosis,
@@ -72,6 +73,16 @@ class LogEvidence:
         seen = self.sight
         return InStretches(self.paper, self.is_of, duration_s, seen.stretches, seen.open)
 
+    def others_of(self, finding: Finding) -> tuple[tuple[str, str, str], ...]:
+        """What together would do in a finding's place: effect, sensor and stage of each."""
+        own = (finding.effect, finding.sensor, finding.stage)
+        known = self.sight.instead if self.sight is not None else ()
+        return next((each.others for each in known if each.found == own), ())
+
+    def split(self, one: Assumed) -> NoiseFactors | None:
+        """The noise of an assumption's sensor, by readings that have a figure of their own."""
+        return None if self.sight is None else self.sight.factors.get(f"{one.stage}/{one.role}")
+
     def is_of(self, effect: str, sensors: Collection[str], stage: str, one: Assumed) -> bool:
         """Whether an effect of a stage's sensors would break this assumption."""
         if effect not in registry():  # a stand-in that is no effect, such as a wave
@@ -89,12 +100,12 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
         return _of_platform(one, log)
     own = [f for f in log.found.findings if log.is_of(f.effect, _sensors(f), f.stage, one)]
     breaking = [f for f in own if f.material and f.kind != "stand_in"]
-    unsure = _whose_noise(one, log, breaking)
+    unsure = _whose_noise(one, log, breaking) or _instead(log, breaking)
     if unsure is not None:
         return unsure
     standing = log.parts.standing(one)
     if breaking or (standing is not None and standing.status == "broken"):
-        said = _broken(one, breaking, standing, _noise_figure(one, log))
+        said = _broken(one, breaking, standing, _noise_figure(one, log), _readings(log.split(one)))
         return _but_for(said, list(log.parts.undone(one, _width(said.measured))))
     shifted = by_shifts(one, shifts(one, log.found), log.paper)
     if shifted is not None and shifted.status == "broken":
@@ -110,6 +121,20 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     if own:
         return _immaterial(one, own, log.paper)
     return _nothing_found(one, log)
+
+
+def _instead(log: LogEvidence, breaking: Sequence[Finding]) -> Judgement | None:
+    """What others together would do as well in its place, where that is so of all that breaks."""
+    words = []
+    for finding in breaking:
+        others = log.others_of(finding)
+        if not others:
+            return None
+        told = " with ".join(f"{name} ({sensor})" for name, sensor, _ in others)
+        words.append(f"{finding.sentence}, or {told} in its place")
+    return (
+        Judgement("not_shown", f"not told apart on this log: {'; '.join(words)}") if words else None
+    )
 
 
 def _width(figure: MeasuredFigure | None) -> float:
@@ -136,9 +161,12 @@ def _sensors(finding: Finding) -> tuple[str, ...]:
 
 def _broken(
     one: Assumed, breaking: Sequence[Finding], standing: Judgement | None,
-    noise: MeasuredFigure | None,
+    noise: MeasuredFigure | None, where: str = "",
 ) -> Judgement:  # fmt: skip
-    """By the largest departure; all of them are said, with what the log cannot tell them from."""
+    """By the largest departure; all of them are said, with what the log cannot tell them from.
+
+    where: in which readings the noise is so large.
+    """
     also = standing if standing is not None and standing.status == "broken" else None
     if not breaking:
         assert also is not None
@@ -148,7 +176,8 @@ def _broken(
     figure = _figure(one, first)
     if one.name == "noise" and noise is not None:
         figure = noise
-        words += "; the interval counts what is as likely another sensor's"
+        words += (f"; {to_digits(noise.value or 0.0, 3)} times{where}, where the interval counts "
+                  "what is as likely another sensor's")  # fmt: skip
     return Judgement("broken", words, figure, first.from_s, first.to_s)
 
 
@@ -162,7 +191,7 @@ def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) ->
         return None
     others = [name.split("/")[1] for name, f in (log.sight.factors if log.sight else {}).items()
               if name.startswith(f"{one.stage}/") and name != f"{one.stage}/{one.role}"
-              and f.high > FACTOR_LIMIT]  # fmt: skip
+              and max(part.high for part in f.parts) > FACTOR_LIMIT]  # fmt: skip
     if not others:
         return None
     words = (f"noise beyond the spec's, of {one.role} or {' or '.join(others)}: this log cannot "
@@ -231,7 +260,8 @@ def _doubt(one: Assumed, log: LogEvidence) -> str:
         if finding.material and finding.effect not in registry():
             return f"the log holds what has no cause by name: {finding.sentence}"
         rivals = [a for a in finding.aliases if log.is_of(a.effect, (a.sensor,), a.stage, one)]
-        if finding.material and rivals:
+        others = any(log.is_of(e, (s,), stage, one) for e, s, stage in log.others_of(finding))
+        if finding.material and (rivals or others):
             return f"this log cannot tell it from what was found: {finding.sentence}"
     return ""
 
@@ -345,10 +375,9 @@ def _sizes(one: Assumed, log: LogEvidence) -> Iterator[float]:
 
 def _noise_figure(one: Assumed, log: LogEvidence) -> MeasuredFigure | None:
     """The standard deviation that was found, white and slow together, over the spec's."""
-    key = f"{one.stage}/{one.role}"
-    own = log.sight.factors.get(key) if log.sight is not None else None
+    key, own = f"{one.stage}/{one.role}", log.split(one)
     if own is not None:
-        return MeasuredFigure(own.value, own.low, own.high)
+        return MeasuredFigure(own.loudest.value, own.loudest.low, own.loudest.high)
     found = log.found
     white = found.noise.white_factor.get(key)
     if white is None:
@@ -360,17 +389,23 @@ def _noise_figure(one: Assumed, log: LogEvidence) -> MeasuredFigure | None:
 
 def _noise(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
     factor = figure.value or 0.0
-    most = max(factor, figure.high or 0.0)
+    own = log.split(one)
+    most = max(factor, figure.high or 0.0) if own is None else own.most
+    where = _readings(own)
     if log.paper.noisier(one.role, one.stage, most):
         words = (f"up to {to_digits(most, 3)} times the spec's figure is nothing unusual on "
-                 f"this log, but "
-                 "turns the verdict")  # fmt: skip
+                 "this log, but turns the verdict")  # fmt: skip
         return Judgement("not_shown", words, figure)
-    return Judgement(
-        "holds",
-        f"{to_digits(factor, 3)} times the spec's figure, nothing material beyond it",
-        figure,
-    )
+    words = f"{to_digits(factor, 3)} times the spec's figure{where}, nothing material beyond it"
+    return Judgement("holds", words, figure)
+
+
+def _readings(own: NoiseFactors | None) -> str:
+    """Which readings a sensor's figure is of, and that of the others: ` in range; 0.98 in ...`."""
+    if own is None or len(own.parts) < 2:
+        return ""
+    others = (f"{to_digits(f.value, 3)} in {' and '.join(f.readings)}" for f in own.parts[1:])
+    return f" in {' and '.join(own.loudest.readings)} ({', '.join(others)})"
 
 
 def _of_platform(one: Assumed, log: LogEvidence) -> Judgement:

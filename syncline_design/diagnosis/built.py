@@ -13,8 +13,9 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.diagnosis.instead import InItsPlace, in_place
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
-from syncline_design.diagnosis.noise_split import NoiseFactor, factors
+from syncline_design.diagnosis.noise_split import NoiseFactors, factors
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import SearchedLog, examined, told
 from syncline_design.diagnosis.search import DiagnosisSettings
@@ -36,15 +37,17 @@ class Sighted:
     """A log's diagnosis, less what stands out in stretches, and what else it says.
 
     taken: the stretches that the diagnosis is without.  factors: noise by `stage/sensor`.
+    instead: what several departures together explain as well as one that was found.
     beyond: how far speed and turn rate are beyond their limits, by code and stage.
     """
 
     found: Diagnosis
     stretches: Stretches = field(default_factory=Stretches)
     open: tuple[LeftOpen, ...] = ()
-    factors: Mapping[str, NoiseFactor] = field(default_factory=dict)
+    factors: Mapping[str, NoiseFactors] = field(default_factory=dict)
     beyond: Mapping[tuple[str, str], Beyond] = field(default_factory=dict)
     taken: tuple[Stands, ...] = ()
+    instead: tuple[InItsPlace, ...] = ()
 
 
 def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> Sighted:
@@ -71,9 +74,10 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             told(one, case),
             replace(seen, stands=stands),
             left,
-            factors(one.data, model),
+            factors(one.data, model, one.search.unlike or ()),
             beyond,
             tuple(taken),
+            in_place(one.data, model, one.search.signatures),
         )
 
 

@@ -1,10 +1,13 @@
 """How much noise each sensor has, with an interval that counts what they can be taken for.
 
-With S_i = F_i + sum_a t_a C_ai the covariance of row i, t_a a sensor's variance over the spec's,
+With S_i = F_i + sum_a t_a C_ai the covariance of row i, t_a the variance over the spec's of some
+readings of a sensor,
     I_ab = tr(S^-1 C_a S^-1 C_b) / 2,   g_a = e' S^-1 C_a S^-1 e / 2 - tr(S^-1 C_a S^-1 F) / 2,
 summed over the rows, t = I^-1 g, again until it rests (Fisher scoring of normal variance
 components).  Its covariance is that of leaving out one of sixteen stretches after the other, so
-slow noise and tails count.  Source: Searle, Casella, McCulloch, Variance Components (1992), ch. 6.
+slow noise and tails count.  Ranges and bearings are two devices in one sensor and have a t each,
+and so have readings that were found unlike.
+Source: Searle, Casella, McCulloch, Variance Components (1992), ch. 6.
 """
 
 from __future__ import annotations
@@ -18,7 +21,8 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from syncline_design.diagnosis.fitting import Data, Model
-from syncline_design.diagnosis.noise import as_specified, white_covariance
+from syncline_design.diagnosis.noise import SensorKey, White, as_specified, white_covariance
+from syncline_design.diagnosis.unlike_readings import READINGS, Unlike, slopes_of_readings
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -30,25 +34,58 @@ LEAST_ROWS: Final = 64
 
 @dataclass(frozen=True, slots=True)
 class NoiseFactor:
-    """A sensor's standard deviation over the spec's, white and slow together, at 95 %."""
+    """Standard deviation over the spec's of a sensor or of some of its readings, white and slow
+    noise together, with its 95 % interval.  readings: their names; none: all of them.
+    """
 
     value: float
     low: float
     high: float
+    readings: tuple[str, ...] = ()
 
 
-def factors(data: Data, model: Model) -> Mapping[str, NoiseFactor]:
+@dataclass(frozen=True, slots=True)
+class NoiseFactors:
+    """Of one sensor, the loudest readings first; share: of each in its variance at the platform's
+    distance.
+    """
+
+    parts: tuple[NoiseFactor, ...]
+    share: tuple[float, ...] = (1.0,)
+
+    @property
+    def loudest(self) -> NoiseFactor:
+        return self.parts[0]
+
+    @property
+    def most(self) -> float:
+        """The factor on all of the sensor that is as bad as what the log leaves open at most."""
+        known = [s * f.value**2 for s, f in zip(self.share, self.parts, strict=True)]
+        more = [s * (f.high**2 - f.value**2) for s, f in zip(self.share, self.parts, strict=True)]
+        return math.sqrt(sum(known) + max(more))
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Readings of one sensor with one factor, and what they scatter by the spec (n, 3, 3) [m2]."""
+
+    sensor: SensorKey
+    readings: tuple[int, ...]
+    covariance: Array
+
+
+def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[str, NoiseFactors]:
     """Of every sensor that the log's error is made of, by `stage/sensor`."""
-    white = data.structure.white
-    if len(data.view) < LEAST_ROWS or not white or not data.axes:
+    split = _parts(data, unlike)
+    if len(data.view) < LEAST_ROWS or not split or not data.axes:
         return {}
     axes = list(data.axes)
     error = np.nan_to_num(model.error)[:, axes]
-    parts = np.stack([_on(w.covariance, axes) for w in white])
+    parts = np.stack([_on(one.covariance, axes) for one in split])
     whole = white_covariance(data.structure, as_specified(data.structure))
     fixed = _on(whole, axes) - parts.sum(0)
     block = np.arange(len(error)) * BLOCKS // len(error)
-    share = np.ones(len(white))
+    share = np.ones(len(split))
     for _ in range(ROUNDS):
         information, score = _sums(error, parts, fixed, share, block)
         share = np.maximum(_solved(information.sum(0), score.sum(0)), LEAST)
@@ -58,10 +95,53 @@ def factors(data: Data, model: Model) -> Mapping[str, NoiseFactor]:
     off = np.array(less) - np.mean(less, axis=0)
     spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum(off**2, axis=0))
     reach = float(t.isf(0.025, BLOCKS - 1)) * spread
-    return {
-        "/".join(w.sensor): NoiseFactor(_root(v), _root(v - r), _root(v + r))
-        for w, v, r in zip(white, values, reach, strict=True)
-    }
+    found: dict[SensorKey, list[tuple[NoiseFactor, float]]] = {}
+    for one, v, r in zip(split, values, reach, strict=True):
+        names = tuple(READINGS[one.sensor[1]][k] for k in one.readings)
+        factor = NoiseFactor(_root(v), _root(v - r), _root(v + r), names if len(names) < 3 else ())
+        found.setdefault(one.sensor, []).append((factor, _share(data, one)))
+    return {"/".join(sensor): _loudest_first(own) for sensor, own in found.items()}
+
+
+def _loudest_first(own: Sequence[tuple[NoiseFactor, float]]) -> NoiseFactors:
+    ranked = sorted(own, key=lambda pair: -pair[0].value)
+    whole = sum(share for _, share in ranked) or 1.0
+    return NoiseFactors(tuple(f for f, _ in ranked), tuple(share / whole for _, share in ranked))
+
+
+def _share(data: Data, one: _Part) -> float:
+    """Variance [m2] that readings add to a target at the platform's distance, by the spec."""
+    stage = next(s for s in data.view.system.stages if s.name == one.sensor[0])
+    sensor, distance_m = getattr(stage, one.sensor[1]), stage.platform.distance_m
+    arms = {"position": (1.0,) * 3, "attitude": (distance_m,) * 3,
+            "ranging": (1.0, distance_m, distance_m)}[one.sensor[1]]  # fmt: skip
+    return float(sum((sensor.sigma[k] * arms[k]) ** 2 for k in one.readings))
+
+
+def _parts(data: Data, unlike: Sequence[Unlike]) -> list[_Part]:
+    grown = {one.sensor: one.growth for one in unlike}
+    slopes = slopes_of_readings(data)
+    found: list[_Part] = []
+    for white in data.structure.white:
+        groups = _groups(white, grown.get(white.sensor, (1.0,) * 3))
+        if len(groups) == 1:
+            found.append(_Part(white.sensor, groups[0], white.covariance))
+            continue
+        own = [slopes[white.sensor][:, :, list(group)] for group in groups]
+        squares = [each @ np.swapaxes(each, 1, 2) for each in own]
+        traces = np.sum([np.einsum("nii->n", each) for each in squares], axis=0)
+        scale = np.einsum("nii->n", white.covariance) / np.maximum(traces, 1e-300)
+        found += [_Part(white.sensor, group, scale[:, None, None] * each)
+                  for group, each in zip(groups, squares, strict=True)]  # fmt: skip
+    return found
+
+
+def _groups(white: White, growth: tuple[float, ...]) -> list[tuple[int, ...]]:
+    """Readings that have one factor: ranges and bearings apart, and what was found unlike."""
+    of: dict[tuple[bool, float], list[int]] = {}
+    for k, own in enumerate(growth):
+        of.setdefault((white.loading is None and k == 0, own), []).append(k)
+    return [tuple(group) for group in of.values()]
 
 
 def _on(covariance: Array, axes: Sequence[int]) -> Array:

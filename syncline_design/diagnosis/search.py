@@ -28,6 +28,8 @@ from syncline_design.diagnosis.episodes import Episode, episode_effect, episodes
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
 from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
+from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
+from syncline_design.diagnosis.pairs import promising, standing, with_pair
 from syncline_design.diagnosis.parts import NATS, STRETCHES, cut_down, in_a_part, refined
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settling import Settled, borne_out, settle
@@ -62,6 +64,7 @@ WANDER_NATS = (
 TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 MOVED = 2.0  # standard uncertainties by which an effect has to move for its rivals to be tried
+PAIRS = 8  # effects two by two that are judged by slow states, the likeliest ones
 EPISODES = 7  # key of the draws that look for them
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
@@ -227,7 +230,9 @@ class Search:
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
         best = preferred(kept)
         if best is None:
-            return self.part_trial(model) or self.wave_trial(model)
+            both = [self.part_trial(model), self.pair_trial(model, scores, threshold)]
+            found = min([t for t in both if t], key=lambda t: t.log_p, default=None)
+            return found or self.wave_trial(model)
         return self.not_for_good(model, best)
 
     def not_for_good(self, model: Model, found: Trial) -> Trial:
@@ -305,6 +310,24 @@ class Search:
         trials = [self.trial(model, one, model.level, parted=True) for one in found]
         kept = [t for t in trials if t.gain > WANDER_NATS and plausible(self.data, t.model)]
         return preferred(kept)
+
+    def pair_trial(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
+        """The model with two effects more, neither of which shows without the other."""
+        free = self.free_signatures(model)
+        seen = [
+            (level, scores if level is model.level else gram(self.data, model, free, level))
+            for level in ladder(self.data, model)
+        ]
+        found = promising(seen, free, threshold)[:PAIRS]
+        limit = self.chance(len({s.candidate.label for s in self.signatures}))
+        trials = []
+        for one in standing(self.states, model, found, limit)[:TRIED_PAIRS]:
+            fitted = with_pair(self.data, model, one)
+            freedom = sum(freedom_of(s.candidate.effect) for s in one.pair)
+            trial = Trial(one.pair[0].candidate, fitted, model.nll - fitted.nll, freedom)
+            if trial.log_p <= threshold and plausible(self.data, fitted):
+                trials.append(trial)
+        return min(trials, key=lambda t: t.log_p, default=None)
 
     def wave_trial(self, model: Model) -> Trial | None:
         """The model with a wave that stands out of what is left, before any noise takes it up."""

@@ -65,7 +65,7 @@ class _Held:
 
 
 @dataclass(frozen=True, slots=True)
-class _Joint:
+class JointNormal:
     """Normal matrix and score in units of what a build can be wrong by; whose each column is."""
 
     normal: Array
@@ -100,7 +100,7 @@ class _Joint:
 
 
 def _left_open(data: Data, model: Model, asked: Sequence[Signature]) -> Iterator[LeftOpen]:
-    joint = _joint(data, model, asked)
+    joint = joint_of(data, model, asked, model.error)
     at = 0
     for k, s in enumerate(asked):
         stage = data.view.system.stages[s.candidate.stage].name
@@ -115,7 +115,7 @@ def _left_open(data: Data, model: Model, asked: Sequence[Signature]) -> Iterator
             at += 1
 
 
-def _by(joint: _Joint, asked: Sequence[Signature], own: int, at: int) -> Label:
+def _by(joint: JointNormal, asked: Sequence[Signature], own: int, at: int) -> Label:
     """What undoes it most: of the kind without which it is best known, the same sensor's first."""
     kinds: dict[str, list[int]] = {}
     for k, s in enumerate(asked):
@@ -130,7 +130,7 @@ def _by(joint: _Joint, asked: Sequence[Signature], own: int, at: int) -> Label:
     return asked[found].candidate.label
 
 
-def _joint(data: Data, model: Model, asked: Sequence[Signature]) -> _Joint:
+def joint_of(data: Data, model: Model, asked: Sequence[Signature], error: Array) -> JointNormal:
     labels = {s.candidate.label for s in asked}
     others = [one for one in model.acting if one.label not in labels]
     own = np.nan_to_num(slopes(data.view, others))
@@ -144,7 +144,7 @@ def _joint(data: Data, model: Model, asked: Sequence[Signature]) -> _Joint:
     every = np.concatenate([own, columns], axis=2)
     weighted = model.precision.solve(every)
     normal = inner(every, weighted)
-    score = inner(weighted, model.error[:, :, None])[:, 0]
+    score = inner(weighted, error[:, :, None])[:, 0]
     width = own.shape[2]
     if width:  # what was found is free as well
         inverse = np.linalg.pinv(normal[:width, :width], rcond=1e-12, hermitian=True)
@@ -152,7 +152,7 @@ def _joint(data: Data, model: Model, asked: Sequence[Signature]) -> _Joint:
         score = score[width:] - cross.T @ inverse @ score[:width]
         normal = normal[width:, width:] - cross.T @ inverse @ cross
     owner = tuple(k for k, s in enumerate(asked) for _ in s.candidate.effect.slopes())
-    return _Joint(normal, score, _held(normal, asked, owner), owner)
+    return JointNormal(normal, score, _held(normal, asked, owner), owner)
 
 
 def _held(normal: Array, asked: Sequence[Signature], owner: Sequence[int]) -> tuple[_Held, ...]:
