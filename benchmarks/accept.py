@@ -4,8 +4,8 @@
 
 Sound logs of every vehicle, motion and noise of `benchmarks/accept_world.py`, and logs with each
 fault in turn.  A fault is found where its row is broken, or that of its twin (an error of the other
-lever arm, a turn of the other sensor), which no log tells apart.  Prints a line a log and keeps it in
-out/accept.jsonl, where a run that was stopped goes on.
+lever arm, a turn of the other sensor), which no log tells apart.  Prints a line a log and keeps it
+in out/accept.jsonl, where a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -239,21 +239,26 @@ def table(found: Sequence[dict[str, Any]], seed: int) -> str:
         "|---|--:|--:|--:|--:|",
     ]
     for noise in NOISES:
-        own = [one for one in sound if one["drive"][2] == noise]
+        quiet = [one for one in sound if one["drive"][2] == noise]
         counts = [
-            sum(row["status"] == s for one in own for row in one["rows"].values())
+            sum(row["status"] == s for one in quiet for row in one["rows"].values())
             for s in ("holds", "not_shown", "broken")
         ]
-        lines.append(f"| {noise} | {len(own)} | " + " | ".join(map(str, counts)) + " |")
+        lines.append(f"| {noise} | {len(quiet)} | " + " | ".join(map(str, counts)) + " |")
     lines += [
         "",
         "| fault | logs | its rows: broken | not shown | held | others broken |",
         "|---|--:|--:|--:|--:|--:|",
     ]
     for fault in dict.fromkeys(one["fault"] for one in broken):
-        own_scores = [s for one, s in zip(broken, scores, strict=True) if one["fault"] == fault]
-        figures = [len(own_scores), sum(s.found for s in own_scores), sum(s.open for s in own_scores),
-                   sum(s.held for s in own_scores), sum(len(s.elsewhere) for s in own_scores)]  # fmt: skip
+        own = [s for one, s in zip(broken, scores, strict=True) if one["fault"] == fault]
+        figures = [
+            len(own),
+            sum(s.found for s in own),
+            sum(s.open for s in own),
+            sum(s.held for s in own),
+            sum(len(s.elsewhere) for s in own),
+        ]
         lines.append(f"| {fault} | " + " | ".join(map(str, figures)) + " |")
     intervals = [hit for s in scores for hit in s.intervals]
     held = [hit for s in scores for hit in s.held_inside]

@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from typing import Final
 
-import numpy as np
-
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.by_motion import CODES, by_motion
 from syncline_design.comparison.by_shift import by_shifts, shifts, widened
 from syncline_design.comparison.by_stretch import SPOKEN_OF, InStretches, amount
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.built import Sighted
-from syncline_design.diagnosis.limits import Beyond
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.noise_split import NoiseFactors
 from syncline_design.diagnosis.result import (
-    Check,
     Diagnosis,
     Estimate,
     Finding,
-    MotionQuantiles,
     Smallest,
 )
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
+from syncline_design.model.figure_text import format_duration, rounded, to_digits
+from syncline_design.model.normal import NORMAL_95
 
 # what undoes a departure, so that neither the log nor the objects' places show both together
 _ALONE: Final = {
@@ -37,10 +34,8 @@ _ALONE: Final = {
     "lever_arm": ", but for an equal error of the other lever arm, which undoes it",
     "mounting": ", but for a turn of the other sensor that undoes it",
 }
-READ: Final = 0.01  # of a limit that readings may lie beyond it
-MOVED: Final = 0.1  # of a limit: a log that stays below it does not show that the limit is kept
-_MOTION: Final = {"speed": ("speed", 1.0), "rate": ("turn_rate", math.pi / 180.0)}
-_CODES: Final = {"speed": "speed", "rate": "turn_rate"}
+_BIAS: Final = "bias_m"  # the parameter of a range that is off by a constant
+LONGEST_S: Final = 4 * 3600.0  # of a drive that one would ask for
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +74,20 @@ class LogEvidence:
         known = self.sight.instead if self.sight is not None else ()
         return next((each.others for each in known if each.found == own), ())
 
+    def within_figure(self, one: Assumed, finding: Finding) -> bool:
+        """Whether a constant of a reading is no more than its figure leaves to noise that is slower
+        than the log: |b| <= 1.96 sigma sqrt(1 - f^2), f the least factor that the log itself shows.
+        """
+        own = self.split(one)
+        bias = finding.parameters.get(_BIAS)
+        if own is None or bias is None or one.name != "noise":
+            return False
+        part = next((f for f in own.parts if f.readings[:1] in ((), ("range",))), None)
+        if part is None:
+            return False
+        slower = math.sqrt(max(1.0 - part.low**2, 0.0)) * own.sigma[0]
+        return abs(float(bias.value)) <= NORMAL_95 * slower
+
     def split(self, one: Assumed) -> NoiseFactors | None:
         """The noise of an assumption's sensor, by readings that have a figure of their own."""
         return None if self.sight is None else self.sight.factors.get(f"{one.stage}/{one.role}")
@@ -96,10 +105,13 @@ class LogEvidence:
 
 def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     """What a measured log says of one assumption."""
-    if one.name in _CODES:
-        return _of_platform(one, log)
+    if one.name in CODES:
+        return by_motion(one, log.found, log.sight, log.last_stage)
     own = [f for f in log.found.findings if log.is_of(f.effect, _sensors(f), f.stage, one)]
-    breaking = [f for f in own if f.material and f.kind != "stand_in"]
+    large = [f for f in own if f.material and f.kind != "stand_in"]
+    breaking = [f for f in large if not log.within_figure(one, f)]
+    if large and not breaking:
+        return Judgement("not_shown", _as_slow(large), _noise_figure(one, log))
     unsure = _whose_noise(one, log, breaking) or _instead(log, breaking)
     if unsure is not None:
         return unsure
@@ -135,6 +147,13 @@ def _instead(log: LogEvidence, breaking: Sequence[Finding]) -> Judgement | None:
     return (
         Judgement("not_shown", f"not told apart on this log: {'; '.join(words)}") if words else None
     )
+
+
+def _as_slow(within: Sequence[Finding]) -> str:
+    """A constant that noise slower than the log leaves as well."""
+    said = "; ".join(finding.sentence for finding in within)
+    return (f"{said}, within the figure: noise that is slower than this log leaves as much, and "
+            "logs of other starts would tell")  # fmt: skip
 
 
 def _width(figure: MeasuredFigure | None) -> float:
@@ -297,12 +316,21 @@ def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
         begins = "half" if math.isinf(length_s) else format_duration(rounded(length_s, 2))
         shows = f" (it shows {sizes})" if sizes else ""
         words = (f"what turns the verdict and acts for less than {begins} of this log would not "
-                 f"have shown{shows}; a longer log would do")  # fmt: skip
+                 f"have shown{shows}; {_longer(log.parts.needs_s(one))}")  # fmt: skip
         return Judgement("not_shown", words)
     stretch = format_duration(rounded(length_s, 2))
     words = (f"not found, and what turns the verdict would have shown wherever it had acted for "
              f"{stretch} or longer ({sizes}){alone}")  # fmt: skip
     return Judgement("holds", words, figure, least_stretch_s=length_s)
+
+
+def _longer(needs_s: float | None) -> str:
+    """Which log would do; needs_s: how long, of such motion and noise."""
+    if needs_s is None:
+        return "a longer log would do"
+    if needs_s > LONGEST_S:
+        return "a log of quicker motion would do"
+    return f"a log of about {format_duration(_rounded_up(needs_s))} of such motion would do"
 
 
 def _with_undone(figure: MeasuredFigure, size: float) -> MeasuredFigure:
@@ -347,6 +375,9 @@ def _hidden_words(shown: Smallest, log: LogEvidence) -> str:
         longer_s = log.found.log.duration_s * (size_of(shown) / at) ** (2.0 / 3.0)
         words += (f" (over the spec's horizon; a log of {format_duration(_rounded_up(longer_s))} "
                   "would show it)")  # fmt: skip
+    elif at:
+        longer_s = log.found.log.duration_s * (size_of(shown) / at) ** 2  # as a mean's error falls
+        words += f" ({_longer(longer_s)})"
     return words
 
 
@@ -406,61 +437,3 @@ def _readings(own: NoiseFactors | None) -> str:
         return ""
     others = (f"{to_digits(f.value, 3)} in {' and '.join(f.readings)}" for f in own.parts[1:])
     return f" in {' and '.join(own.loudest.readings)} ({', '.join(others)})"
-
-
-def _of_platform(one: Assumed, log: LogEvidence) -> Judgement:
-    """Speed or turn rate: a contradiction or caution of the log's checks breaks it, and so does a
-    mean over seconds that lies beyond the limit whatever the readings' noise."""
-    found, code = log.found, _CODES[one.name]
-    name, unit = _MOTION[one.name]
-    motion = found.log.motion.get(name)
-    mean = log.sight.beyond.get((code, one.stage)) if log.sight is not None else None
-    beyond = _check(found.checks, code, one.stage)
-    if beyond is not None:
-        ends = (None, None) if mean is None else (mean.low, mean.high)
-        return Judgement("broken", beyond.message, MeasuredFigure(beyond.value, *ends))
-    if mean is not None and one.value is not None and mean.least > (1.0 + READ) * one.value:
-        return _over(one, mean)
-    own = motion if one.stage == log.last_stage else None
-    if one.value is None or (own is None and mean is None):
-        return Judgement("not_shown", "the log does not tell of it")
-    reached, figure = _reached(own, mean, unit)
-    most = figure.value or 0.0
-    if reached < MOVED * one.value:
-        return Judgement("not_shown", "the log stays far below the limit", figure)
-    if most > (1.0 + READ) * one.value:
-        words = "the log goes beyond the limit for moments, or its readings scatter that far"
-        return Judgement("not_shown", words, figure)
-    by_means = (
-        ""
-        if own is not None or mean is None
-        else f", as a mean over {format_duration(rounded(mean.over_s, 2))}"
-    )
-    return Judgement("holds", f"the most that the log reaches{by_means}", figure)
-
-
-def _reached(
-    motion: MotionQuantiles | None, mean: Beyond | None, unit: float
-) -> tuple[float, MeasuredFigure]:
-    """What 95 % of a log stay below, and the most; of an earlier stage by means over seconds."""
-    if motion is None:
-        assert mean is not None
-        return float(np.quantile(mean.means, 0.95)), MeasuredFigure(mean.most, mean.low, mean.high)
-    reached = max(abs(motion.low), abs(motion.high)) * unit
-    most = reached if motion.most is None else motion.most * unit
-    if mean is None:
-        return reached, MeasuredFigure(most)
-    return reached, MeasuredFigure(most, min(mean.low, most), max(mean.high, most))
-
-
-def _over(one: Assumed, mean: Beyond) -> Judgement:
-    share = mean.share((1.0 + READ) * (one.value or 0.0))
-    words = (f"beyond the limit in {percent(share, 2)} of the log, by means over "
-             f"{format_duration(rounded(mean.over_s, 2))} and more than the "
-             f"readings' noise "
-             "can do")  # fmt: skip
-    return Judgement("broken", words, MeasuredFigure(mean.most, mean.low, mean.high))
-
-
-def _check(checks: Iterable[Check], code: str, stage: str) -> Check | None:
-    return next((c for c in checks if (c.code, c.stage) == (code, stage)), None)

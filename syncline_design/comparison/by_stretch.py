@@ -11,6 +11,7 @@ from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper
+from syncline_design.diagnosis.result import Smallest
 from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
@@ -96,6 +97,28 @@ class InStretches:
             low, high = (low, middle) if shown(middle) else (middle + 1, high)
         least = lengths[low] if low < len(lengths) else math.inf
         return least, "; ".join(_sizes(lengths, worst, low))
+
+    def needs_s(self, one: Assumed) -> float | None:
+        """How long a log of such motion and noise would show what turns the verdict; None: unknown.
+
+        A stretch that shows it may be half of the log; where none does, what shows in all of it
+        falls with the root of its length.
+        """
+        told = [self._needs_s(own) for own in self._reaches(one)]
+        return None if None in told else max((t for t in told if t is not None), default=None)
+
+    def _needs_s(self, own: Sequence[ShownSize]) -> float | None:
+        least, _ = self._shortest(own)
+        if math.isfinite(least):
+            return least / SPOKEN_OF
+        worst = max(own, key=lambda r: r.sizes[-1])
+        size = worst.sizes[-1]
+        if not math.isfinite(size):
+            return None
+        name, sensor, _ = worst.label
+        shown = Smallest(name, sensor, worst.stage, worst.parameter, size, size)
+        at = self.paper.turns_at(shown)
+        return None if at is None else worst.lengths_s[-1] * (size / at) ** 2 / SPOKEN_OF
 
     def undone(self, one: Assumed, least: float | None = None) -> Iterator[str]:
         """Departures that another one undoes on this log, so far that the verdict would turn.

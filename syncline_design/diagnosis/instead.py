@@ -38,7 +38,7 @@ class InItsPlace:
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class Departures:
     """Departures: label, which assumption each breaks, which columns it has; N and g of all."""
 
     labels: tuple[Label, ...]
@@ -71,16 +71,16 @@ def in_place(data: Data, model: Model, found: Sequence[Signature]) -> tuple[InIt
     columns = tuple(
         tuple(at for at, owner in enumerate(joint.owner) if owner == k) for k in range(len(signed))
     )
-    asked = _Asked(labels, tuple(s.candidate.effect.breaks for s in signed), columns,
+    asked = Departures(labels, tuple(s.candidate.effect.breaks for s in signed), columns,
                    joint.normal, joint.score)  # fmt: skip
     names = [stage.name for stage in data.view.system.stages]
     held = {labels.index(one.label) for one in own}
     return tuple(_each(asked, held, names))
 
 
-def _each(asked: _Asked, held: Collection[int], names: Sequence[str]) -> Iterator[InItsPlace]:
+def _each(asked: Departures, held: Collection[int], names: Sequence[str]) -> Iterator[InItsPlace]:
     for k in sorted(held):
-        others = _others(asked, k, frozenset(held) - {k})
+        others = others_in_place(asked, k, frozenset(held) - {k})
         if others is not None:
             told = tuple(_named(asked.labels[i], names) for i in sorted(others[0]))
             yield InItsPlace(_named(asked.labels[k], names), told, others[1])
@@ -91,7 +91,9 @@ def _named(label: Label, names: Sequence[str]) -> Named:
     return effect, sensor, names[stage]
 
 
-def _others(asked: _Asked, own: int, kept: frozenset[int]) -> tuple[frozenset[int], float] | None:
+def others_in_place(
+    asked: Departures, own: int, kept: frozenset[int]
+) -> tuple[frozenset[int], float] | None:
     """The fewest others that do in its place, and how much worse; None where none do together."""
     best: tuple[frozenset[int], float] | None = None
     for free in _allowed(asked, own, kept):
@@ -113,7 +115,7 @@ def _others(asked: _Asked, own: int, kept: frozenset[int]) -> tuple[frozenset[in
     return best
 
 
-def _allowed(asked: _Asked, own: int, kept: frozenset[int]) -> Iterator[frozenset[int]]:
+def _allowed(asked: Departures, own: int, kept: frozenset[int]) -> Iterator[frozenset[int]]:
     """Sets of what could be in its place: no two delays more, nothing of its own kind that it
     moves no object with."""
     _, _, stage = asked.labels[own]

@@ -5,8 +5,9 @@ readings of a sensor,
     I_ab = tr(S^-1 C_a S^-1 C_b) / 2,   g_a = e' S^-1 C_a S^-1 e / 2 - tr(S^-1 C_a S^-1 F) / 2,
 summed over the rows, t = I^-1 g, again until it rests (Fisher scoring of normal variance
 components).  Its covariance is that of leaving out one of sixteen stretches after the other, so
-slow noise and tails count.  Ranges and bearings are two devices in one sensor and have a t each,
-and so have readings that were found unlike.
+tails count, and beside it what the fitted slow noise makes of so long a mean square.  Ranges and
+bearings are two devices in one sensor and have a t each, and so have readings that were found
+unlike.
 Source: Searle, Casella, McCulloch, Variance Components (1992), ch. 6.
 """
 
@@ -25,6 +26,7 @@ from syncline_design.diagnosis.noise import SensorKey, White, as_specified, whit
 from syncline_design.diagnosis.unlike_readings import READINGS, Unlike, slopes_of_readings
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NORMAL_95
 
 BLOCKS: Final = 16
 ROUNDS: Final = 6
@@ -47,11 +49,12 @@ class NoiseFactor:
 @dataclass(frozen=True, slots=True)
 class NoiseFactors:
     """Of one sensor, the loudest readings first; share: of each in its variance at the platform's
-    distance.
+    distance.  sigma: of its readings by the spec, SI.
     """
 
     parts: tuple[NoiseFactor, ...]
     share: tuple[float, ...] = (1.0,)
+    sigma: tuple[float, ...] = ()
 
     @property
     def loudest(self) -> NoiseFactor:
@@ -94,28 +97,58 @@ def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[
             for i, s in zip(information, score, strict=True)]  # fmt: skip
     off = np.array(less) - np.mean(less, axis=0)
     spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum(off**2, axis=0))
-    reach = float(t.isf(0.025, BLOCKS - 1)) * spread
+    slow = np.array([_of_slow(data, model, one) for one in split])
+    reach = np.hypot(float(t.isf(0.025, BLOCKS - 1)) * spread, NORMAL_95 * slow)
     found: dict[SensorKey, list[tuple[NoiseFactor, float]]] = {}
     for one, v, r in zip(split, values, reach, strict=True):
         names = tuple(READINGS[one.sensor[1]][k] for k in one.readings)
         factor = NoiseFactor(_root(v), _root(v - r), _root(v + r), names if len(names) < 3 else ())
         found.setdefault(one.sensor, []).append((factor, _share(data, one)))
-    return {"/".join(sensor): _loudest_first(own) for sensor, own in found.items()}
+    return {"/".join(key): _loudest_first(own, _sigma(data, key)) for key, own in found.items()}
 
 
-def _loudest_first(own: Sequence[tuple[NoiseFactor, float]]) -> NoiseFactors:
+def _of_slow(data: Data, model: Model, one: _Part) -> float:
+    """Standard deviation of a log's mean square, over the spec's, that slow noise makes of it.
+
+    A mean over D of the square of Gauss-Markov noise of variance v and time constant T has the
+    variance 2 v^2 T / D; stretches shorter than T vary together and say less of it.
+    """
+    keys = [part.sensor for part in data.structure.slow]
+    if one.sensor not in keys:
+        return 0.0
+    at = keys.index(one.sensor)
+    white = [w.sensor for w in data.structure.white].index(one.sensor)
+    scale2 = max(model.level.factor[white], 1.0) ** 2
+    time_s = data.structure.time_s
+    span_s = max(float(time_s[-1] - time_s[0]), 1e-9)
+    both = zip(model.level.slow[at], model.level.time_constant_s[at], strict=True)
+    parts = [2.0 * (scale2 * v) ** 2 * min(constant_s / span_s, 1.0) for v, constant_s in both]
+    own = [parts[k] for k in one.readings]
+    return math.sqrt(sum(own)) / len(own)
+
+
+def _sigma(data: Data, key: SensorKey) -> tuple[float, ...]:
+    stage = next(s for s in data.view.system.stages if s.name == key[0])
+    return tuple(float(s) for s in getattr(stage, key[1]).sigma)
+
+
+def _loudest_first(
+    own: Sequence[tuple[NoiseFactor, float]], sigma: tuple[float, ...]
+) -> NoiseFactors:
     ranked = sorted(own, key=lambda pair: -pair[0].value)
     whole = sum(share for _, share in ranked) or 1.0
-    return NoiseFactors(tuple(f for f, _ in ranked), tuple(share / whole for _, share in ranked))
+    return NoiseFactors(
+        tuple(f for f, _ in ranked), tuple(share / whole for _, share in ranked), sigma
+    )
 
 
 def _share(data: Data, one: _Part) -> float:
     """Variance [m2] that readings add to a target at the platform's distance, by the spec."""
     stage = next(s for s in data.view.system.stages if s.name == one.sensor[0])
-    sensor, distance_m = getattr(stage, one.sensor[1]), stage.platform.distance_m
+    distance_m, sigma = stage.platform.distance_m, _sigma(data, one.sensor)
     arms = {"position": (1.0,) * 3, "attitude": (distance_m,) * 3,
             "ranging": (1.0, distance_m, distance_m)}[one.sensor[1]]  # fmt: skip
-    return float(sum((sensor.sigma[k] * arms[k]) ** 2 for k in one.readings))
+    return float(sum((sigma[k] * arms[k]) ** 2 for k in one.readings))
 
 
 def _parts(data: Data, unlike: Sequence[Unlike]) -> list[_Part]:
