@@ -30,9 +30,12 @@ from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.consequence import promise_of
+from syncline_design.diagnosis.instead import InItsPlace
 from syncline_design.diagnosis.limits import Beyond
+from syncline_design.diagnosis.noise_split import NoiseFactor, NoiseFactors
 from syncline_design.diagnosis.result import (
     BlindSpot,
+    Check,
     Diagnosis,
     Informative,
     Rival,
@@ -237,6 +240,63 @@ def test_what_holds_has_an_interval_that_what_is_undone_lies_in(
     assert row.status == "holds", row
     assert row.measured is not None
     assert (row.measured.low, row.measured.high) == (-0.06, 0.06)
+
+
+def test_what_others_do_together_in_its_place_breaks_nothing(found: Diagnosis) -> None:
+    """A ranging delay beside an arm would do as well as the delay found: none of them is said."""
+    case = load(EXAMPLE)
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    (late,) = [f for f in found.findings if f.effect == "latency"]
+    own = (late.effect, late.sensor, late.stage)
+    others = (("latency", "ranging", late.stage), ("lever_arm", "ranging", late.stage))
+    sight = Sighted(found, instead=(InItsPlace(own, others, 0.4),))
+    log = LogEvidence(found, OnPaper(case, ()), late.stage, sight=sight)
+    rows = {(a.role, a.name): by_log(a, log) for a in assumptions(case, verdict)}
+    assert "or latency (ranging) with lever_arm (ranging)" in rows["position", "latency"].words
+    doubted = (("position", "latency"), ("ranging", "latency"), ("ranging", "lever_arm"))
+    assert [rows[one].status for one in doubted] == ["not_shown"] * 3
+    assert rows["position", "lever_arm"].status == "holds"
+
+
+@pytest.mark.parametrize(("low", "status"), [(0.98, "broken"), (0.5, "not_shown")])
+def test_a_bias_that_slower_noise_could_leave_breaks_no_figure(
+    found: Diagnosis, low: float, status: str
+) -> None:
+    """1.5 cm of 2 cm: beside 0.98 of the figure seen, 0.2 of it is left; beside 0.5, 0.87 of it."""
+    case = load(EXAMPLE)
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    part = replace(found.findings[0].parameters["latency_s"], value=0.015, unit="m")
+    off = replace(found.findings[0], effect="range_bias", sensor="ranging", also=None,
+                  parameters={"bias_m": part}, kind="cause", material=True)  # fmt: skip
+    ranges = NoiseFactor(1.0, low, 1.05, ("range",))
+    split = NoiseFactors((ranges,), (1.0,), (0.02, 0.001, 0.001))
+    one = next(a for a in assumptions(case, verdict) if (a.role, a.name) == ("ranging", "noise"))
+    sight = Sighted(found, factors={f"{one.stage}/ranging": split})
+    log = LogEvidence(replace(found, findings=(off,)), OnPaper(case, ()), one.stage, sight=sight)
+    row = by_log(one, log)
+    assert row.status == status, row
+    assert ("slower than this log" in row.words) == (status == "not_shown")
+
+
+def test_the_figure_of_a_limit_is_the_one_that_its_interval_is_of(
+    known: tuple[Case, Diagnosis],
+) -> None:
+    """The log's check says a quantile, 95 % below; the figure is the largest mean, in its interval.
+
+    12.2 m/s by single readings, 11.9 by means over 2 s.
+    """
+    case, found = known
+    check = Check("speed", found.findings[0].stage if found.findings else "multirotor", "caution",
+                  "speed of multirotor reaches 11.2 m/s", 11.2, 9.0, "m/s", 0.4)  # fmt: skip
+    mean = Beyond(11.9, 11.8, 12.0, 11.7, 9.0, 2.0, np.full(9, 11.9), 0.2)
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    one = next(a for a in assumptions(case, verdict) if a.name == "speed")
+    wrong = replace(found, checks=(replace(check, stage=one.stage),))
+    sight = Sighted(wrong, beyond={("speed", one.stage): mean})
+    row = by_log(one, LogEvidence(wrong, OnPaper(case, ()), one.stage, sight=sight))
+    assert row.status == "broken"
+    assert row.measured == MeasuredFigure(11.9, 11.8, 12.0)
+    assert "largest mean over 2 s" in row.words
 
 
 def test_a_wave_that_is_no_effect_leaves_the_rows_open(found: Diagnosis) -> None:
@@ -587,6 +647,18 @@ def test_stamps_that_may_be_early_by_more_than_tau_are_not_shown(clocked: Path) 
     rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
     assert rows["position"]["status"] == "not_shown"
     assert 0.03 < rows["position"]["measured"]["value"] < 0.032
+
+
+def test_stamps_ahead_of_their_receipts_are_so_much_off_and_no_more(clocked: Path) -> None:
+    """1.9 ms ahead of the truth, receipts up to 1.5 ms after it: by the table, 1.9 ms at most."""
+    log = stamped(clocked.parent / "uav_position.csv", 0.0, -0.0019)
+    stamp, receive = np.loadtxt(log, delimiter=",", skiprows=1, unpack=True)
+    apart = np.abs(receive - stamp)
+    assert np.max(apart) < 0.002 < np.max(apart) + np.ptp(receive - stamp)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == "holds", rows["position"]
+    assert rows["position"]["measured"]["value"] == pytest.approx(np.max(apart), rel=0.02)
 
 
 def test_what_cannot_be_asked_is_refused(clocked: Path, tmp_path: Path) -> None:

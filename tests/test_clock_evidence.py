@@ -315,8 +315,20 @@ def test_what_it_means_for_a_spec_is_what_check_then_says(tmp_path: Path) -> Non
     verdict = check_loaded(load(with_it), CheckSettings(monte_carlo=False))
     assert verdict.design is not None
     (stage,) = verdict.design.stages
+    (clock,) = verdict.design.clocks
+    offsets = {"utc": 0.0, "host": clock.offset_bound_s}
     taus = {row["role"]: row["measured_tau_s"] for row in means["sensors"]}
-    assert taus == pytest.approx({k: r.tau_s for k, r in stage.roles.items()}, rel=1e-5)
+    own = {k: r.tau_s + offsets[r.timeline] for k, r in stage.roles.items()}
+    assert taus == pytest.approx(own, rel=2e-4)  # an entry is rounded up
+    was = check_loaded(load(spec), CheckSettings(monte_carlo=False)).design
+    assert was is not None
+    more_s = clock.offset_bound_s - was.clocks[0].offset_bound_s
+    assert {r.timeline for r in stage.roles.values()} == {"utc", "host"}
+    for row in means["sensors"]:
+        moved = row["measured_tau_s"] - row["tau_s"]
+        change = more_s if row["timeline"] == "host" else 0.0
+        assert moved == pytest.approx(change, rel=2e-4, abs=1e-12)
+        assert (row["bound_ratio"] is None) == (row["timeline"] == "utc")
 
 
 def _spoiled(folder: Path, name: str) -> list[Path]:

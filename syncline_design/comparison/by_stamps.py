@@ -33,7 +33,7 @@ def by_stamps(one: Assumed, found: Audit) -> Judgement | None:
     if faults:
         words = "; ".join(f"{f.fault}: {f.evidence}" for f in own or faults)
         if own and _within(own, stream, one.value):
-            return _sound(one.value, stream, abs(stream.offset_s or 0.0) + _recorded(stream), words)
+            return _sound(one.value, stream, _apart(stream, _recorded(stream)), words)
         if own:
             return Judgement("broken", f"stream {stream.name}: {words}", _figure(own, stream))
         return Judgement("not_shown", f"stream {stream.name}: its receipts say nothing: {words}")
@@ -41,7 +41,17 @@ def by_stamps(one: Assumed, found: Audit) -> Judgement | None:
     size = stream.residual_s.as_recorded if late else stream.residual_s.bound
     if stream.stamps.secondary is None or size is None:
         return Judgement("not_shown", f"stream {stream.name} has one time a message")
-    return _sound(one.value, stream, abs(stream.offset_s or 0.0) + size)
+    return _sound(one.value, stream, _apart(stream, size))
+
+
+def _apart(stream: StreamAudit, size: float) -> float:
+    """The longest time between a stamp and its receipt, either way.
+
+    Receipt minus stamp goes from that of the fastest message to `size` above it; of stamps ahead of
+    their receipts the fastest message is the worst one.
+    """
+    fastest = -(stream.offset_s or 0.0)
+    return max(abs(fastest), abs(fastest + size))
 
 
 def _recorded(stream: StreamAudit) -> float:

@@ -25,8 +25,10 @@ from syncline_design.verdict.verify import check_loaded
 class SensorUnderTiming(Record):
     """One sensor of the spec's design.
 
-    tau_s: as the spec has it; measured_tau_s: with the measured clock in place (None: of a method,
-    which is not put in place); bound_ratio: the measured bound alone over tau_crit.
+    tau_s: of its stamps as the spec has them, its host clock's bound included where another sensor
+    is on another clock; measured_tau_s: the same with the measured clock in place (None: of a
+    method, which is not put in place); bound_ratio: the measured bound alone over tau_crit (None:
+    of a sensor that no bound of a clock is counted for).
     """
 
     stage: str
@@ -146,15 +148,37 @@ def _changes(before: Verdict, after: Verdict | None) -> tuple[str, ...]:
 def _sensors(
     before: Verdict, after: Verdict | None, bound_s: float
 ) -> tuple[SensorUnderTiming, ...]:
-    changed = _roles(after) if after is not None else {}
+    taus, changed = _taus(before), _taus(after)
     return tuple(
         SensorUnderTiming(
-            stage, role, row.sensor, row.timeline, row.tau_crit_s, row.tau_s,
-            changed[stage, role].tau_s if (stage, role) in changed else None,
-            bound_s / row.tau_crit_s if row.tau_crit_s else None,
+            stage, role, row.sensor, row.timeline, row.tau_crit_s, taus[stage, role],
+            changed.get((stage, role)),
+            bound_s / row.tau_crit_s
+            if row.tau_crit_s and taus[stage, role] != row.tau_s
+            else None,
         )
         for (stage, role), row in _roles(before).items()
     )  # fmt: skip
+
+
+def _taus(verdict: Verdict | None) -> dict[tuple[str, str], float]:
+    """tau of every sensor's stamps: the offset of the clock that they stand on counts unless all
+    sensors stand on that clock, where it cancels.
+    """
+    if verdict is None or verdict.design is None:
+        return {}
+    vehicles = {stage.name: stage.vehicle for stage in verdict.design.stages}
+    offsets = {clock.vehicle: clock.offset_bound_s for clock in verdict.design.clocks}
+    roles = _roles(verdict)
+    on = {
+        (stage, role): vehicles[stage] if row.timeline == "host" else None
+        for (stage, role), row in roles.items()
+    }
+    apart = len(set(on.values())) > 1 or len(on) == 1
+    return {
+        key: row.tau_s + (offsets.get(clock, 0.0) if apart and (clock := on[key]) else 0.0)
+        for key, row in roles.items()
+    }
 
 
 def _roles(verdict: Verdict) -> dict[tuple[str, str], NamedRole]:
