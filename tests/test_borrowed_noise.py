@@ -17,6 +17,7 @@ from syncline_design.diagnosis.axes import still_axes_apart, varying_axes
 from syncline_design.diagnosis.borrowed import borrowed_nats, doubt_nats, noisier_scenes
 from syncline_design.diagnosis.cancelling import cancelling
 from syncline_design.diagnosis.charges import UNUSUAL_NATS, Charge
+from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import data_of, fit
 from syncline_design.diagnosis.noise import (
@@ -67,6 +68,25 @@ def test_a_delay_borrows_the_noise_of_velocities(tmp_path: Path) -> None:
     variance = SPEED_MPS**2 * delay_s * 0.1
     assert found == pytest.approx(0.5 * 3 * ROWS * variance / POSITION_M**2, rel=0.12)
     assert borrowed_nats((), late, view.error(late), known) == 0.0
+
+
+def test_what_is_borrowed_counts_less_where_the_log_is_louder(tmp_path: Path) -> None:
+    """Three times the noise over a third of the rows: each of these weighs a ninth."""
+    view = moving(tmp_path)
+    draws = noisier_scenes(view, np.random.default_rng(1))
+    quiet = replace(data_of(view, structure_of(view)), noisier=draws)
+    own = quiet.structure.white[0].sensor
+    stretch = Episode(
+        own, from_s=0.0, to_s=0.1 * (ROWS // 3) - 0.05, factor=3.0, spread=0.1, gain=9.0
+    )
+    data = with_episodes(quiet, (stretch,))
+    delay_s = 0.5
+    late = (acting("latency", "position", 0, {"latency_s": delay_s}),)
+    level = replace(as_specified(data.structure), episodes=True)
+    found = borrowed_nats(data.noisier, late, view.error(late), precision(data.structure, level))
+    variance = SPEED_MPS**2 * delay_s * 0.1
+    rows = ROWS * (2.0 / 3.0 + 1.0 / 27.0)
+    assert found == pytest.approx(0.5 * 3 * rows * variance / POSITION_M**2, rel=0.12)
 
 
 def test_doubt_is_two_deviations_of_the_cross_term() -> None:

@@ -299,21 +299,39 @@ def test_what_is_no_interval_is_refused_at_its_place(
     assert message in str(refused.value)
 
 
-def test_fixes_move_the_far_end(tmp_path: Path) -> None:
-    """A lidar that ends at 40 m: the interval ends there, too."""
+def reaching(folder: Path, reach: str, distance: str = "") -> Any:
+    """What `check` says of a lidar that ends at `reach`; distance: one alone, of the platform."""
     part = {"modality": "ranging", "type": "lidar", "primitives": [], "sigma_range": "2 cm",
-            "sigma_bearing": "0.05 deg", "reach": {"max": "40 m"}}  # fmt: skip
-    (tmp_path / "parts.yaml").write_text(json.dumps({"sensors": {"reaches_40": part}}))
+            "sigma_bearing": "0.05 deg", "reach": {"max": reach}}  # fmt: skip
+    (folder / "parts.yaml").write_text(json.dumps({"sensors": {"lidar": part}}))
     head, stamp = SPEC.split("    ranging: ")[0], "{distribution: constant, value: 0 s}"
     head = "\n".join(line for line in head.splitlines() if "-1, kind" not in line or "ACC" in line)
     text = head.replace("low to high", "low to high\nobjective: error\ncatalogs: [parts.yaml]")
-    text += f"\n    ranging: {{candidates: [reaches_40], timestamping: {{error: {stamp}}}}}\n"
-    case = load_text(text, tmp_path / "s.yaml")
-    found = check_loaded(case, CheckSettings(monte_carlo=False)).to_json()
+    text += f"\n    ranging: {{candidates: [lidar], timestamping: {{error: {stamp}}}}}\n"
+    if distance:
+        text = text.replace("    distance: 10 m .. 60 m\n", "")
+        text = text.replace("baseline: 0 m}", f"baseline: 0 m, distance: {distance}}}")
+    case = load_text(text, folder / "s.yaml")
+    return check_loaded(case, CheckSettings(monte_carlo=False)).to_json()
+
+
+def test_fixes_move_the_far_end(tmp_path: Path) -> None:
+    """A lidar that ends at 40 m: the interval ends there, too."""
+    found = reaching(tmp_path, "40 m")
     assert found["verdict"] == "infeasible"
     fix = next(one for one in found["infeasibility"]["fixes"] if one["figure"] == "distance")
     assert fix["to"] == 40.0
     assert "far end of the distance of uav from 60 m to 40 m" in fix["text"]
+
+
+def test_a_fix_before_the_near_end_leaves_one_distance(tmp_path: Path) -> None:
+    """A lidar that ends at 8 m, from 10 m on: an interval `10 m .. 8 m` cannot be written."""
+    found = reaching(tmp_path, "8 m")
+    assert found["verdict"] == "infeasible"
+    fix = next(one for one in found["infeasibility"]["fixes"] if one["figure"] == "distance")
+    assert fix["to"] == 8.0
+    assert fix["text"] == "distance of uav from 10 m .. 60 m to 8 m alone, of its platform"
+    assert reaching(tmp_path, "8 m", distance="8 m")["verdict"] == "meets"
 
 
 def test_no_more_intervals_than_can_be_looked_at(tmp_path: Path) -> None:

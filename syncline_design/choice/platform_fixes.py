@@ -32,7 +32,7 @@ from syncline_design.choice.variations import (
 from syncline_design.choice.written import DIGITS, in_unit_of
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Dimension, Quantity
-from syncline_design.spec.case import Case
+from syncline_design.spec.case import Case, ends_of
 from syncline_design.spec.exact import fraction_of
 
 LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
@@ -59,13 +59,22 @@ def platform_fixes(case: Case, build: Build) -> Iterator[Fix]:
                 asked = _Asked(case, build, index, figure, dimension, float(before), written)
                 after = asked.nearest(end * float(before))
                 if after is not None:
-                    if figure == "distance" and stage.distance is not None:
-                        words = "far end of the distance"
                     text = f"{words} of {stage.name} from {_shown(before, dimension)}"
+                    text = f"{text} to {after.text}"
+                    if figure == "distance" and stage.distance is not None:
+                        text = _of_several(stage.name, stage.distance, after)
                     yield Fix(
                         "platform", None, figure, stage.name, float(before), float(after),
-                        UNITS_OF[figure], f"{text} to {after.text}",
+                        UNITS_OF[figure], text,
                     )  # fmt: skip
+
+
+def _of_several(stage: str, distances: Quantity, after: Quantity) -> str:
+    """Several distances with another far end; one alone where that is before the near end."""
+    near, far = ends_of(distances)
+    if after < near:
+        return f"distance of {stage} from {distances.text} to {after.text} alone, of its platform"
+    return f"far end of the distance of {stage} from {far.text} to {after.text}"
 
 
 def _shown(value: float, dimension: Dimension) -> str:

@@ -71,7 +71,8 @@ def with_episodes(data: Data, found: tuple[Episode, ...]) -> Data:
         own = [one.growth(time_s) for one in found if one.sensor == part.sensor]
         white.append(replace(part, growth=np.prod(own, axis=0)) if own else part)
     structure = replace(data.structure, white=tuple(white))
-    return replace(data_of(data.view, structure), axes=data.axes, explained=data.explained)
+    louder = data_of(data.view, structure)
+    return replace(louder, axes=data.axes, noisier=data.noisier, explained=data.explained)
 
 
 def episodes(data: Data, model: Model, rng: np.random.Generator) -> tuple[Episode, ...]:
