@@ -105,6 +105,25 @@ def test_an_output_is_refused_in_the_place_of_an_input(
     assert "is read by this command" in words or "a YAML file is there" in words
 
 
+@pytest.mark.parametrize("name", READ[:-1])
+@pytest.mark.parametrize("alias", ["a hard link", "a symlink"])
+def test_no_chart_takes_the_place_of_an_input(folder: Path, name: str, alias: str) -> None:
+    """`ledger.svg` in the folder for charts leads to a file that the command reads."""
+    (folder / "charts").mkdir()
+    place = folder / "charts" / "ledger.svg"
+    if alias == "a hard link":
+        place.hardlink_to(folder / name)
+    else:
+        place.symlink_to(Path("..") / name)
+    words = " ".join(refused(folder, ("check", "spec.yaml", "--output", "svg:charts")).split())
+    assert "ledger.svg: is read by this command" in words or "a YAML file is there" in words
+
+
+def test_no_result_goes_where_a_chart_may_go(folder: Path) -> None:
+    outputs = ("--output", "svg:charts", "--output", "json:charts/../charts/ledger.svg")
+    assert "two outputs go to" in refused(folder, ("check", "spec.yaml", *outputs))
+
+
 @pytest.mark.parametrize("option", [("optimize", "--write-design"), ("diagnose", "--write-spec")])
 @pytest.mark.parametrize("name", READ)
 @pytest.mark.parametrize("alias", ["its own name", "a hard link", "a symlink"])

@@ -179,6 +179,7 @@ def output_targets(
         STDOUT,
         OutputError,
         apart,
+        chart_places,
         check_targets,
         check_writable,
         parse_target,
@@ -193,7 +194,8 @@ def output_targets(
         check_targets(targets, reads)
         for path in reads:
             note_read(path)
-        claim_outputs([*specs, *(Path(t.path) for t in targets if t.path != STDOUT)])
+        files = [Path(t.path) for t in targets if t.path != STDOUT]
+        claim_outputs([*specs, *files, *chart_places(targets)])
     except (OutputError, ReplacedInputError) as error:
         refuse(f"syncline-design: {error}")
     return targets

@@ -96,11 +96,21 @@ def check_targets(targets: Sequence[OutputTarget], reads: Sequence[Path] = ()) -
             where = "standard output" if key == STDOUT else target.path
             raise OutputError(f"two outputs go to {where}; give each its own path")
         seen.add(key)
+        _keep_from_charts(target, targets)
         if target.path.endswith("/"):
             raise OutputError(f"{target.path}: is a folder; give the name of a file in it")
         if target.path != STDOUT and not is_stream(target.path):
             _keep_inputs(target, key, inputs)
             check_writable(Path(target.path))
+
+
+def _keep_from_charts(target: OutputTarget, targets: Sequence[OutputTarget]) -> None:
+    """Refuse a file that a chart of another target might take the place of."""
+    path = Path(os.path.realpath(target.path))
+    for other in targets:
+        charts = other.format in CHART_FORMATS and path.suffix == f".{other.format}"
+        if charts and target.path != STDOUT and path.parent == Path(os.path.realpath(other.path)):
+            raise OutputError(f"two outputs go to {target.path}; give each its own path")
 
 
 def _check_folder(target: OutputTarget, inputs: set[str]) -> None:
@@ -109,6 +119,18 @@ def _check_folder(target: OutputTarget, inputs: set[str]) -> None:
     if os.path.realpath(path) in inputs or (path.exists() and not path.is_dir()):
         raise OutputError(f"{target.path}: is no folder; {target.format} writes a file a chart")
     check_writable(path / f"chart.{target.format}")
+    for place in chart_places([target]):
+        _keep_inputs(target, os.path.realpath(place), inputs, place)
+
+
+def chart_places(targets: Sequence[OutputTarget]) -> list[Path]:
+    """What lies where charts may go, links as well: a chart would take its place."""
+    return [
+        place
+        for target in targets
+        if target.format in CHART_FORMATS
+        for place in sorted(Path(target.path).glob(f"*.{target.format}"))
+    ]
 
 
 def apart(path: Path, targets: Sequence[OutputTarget]) -> None:
@@ -119,12 +141,15 @@ def apart(path: Path, targets: Sequence[OutputTarget]) -> None:
             raise OutputError(f"two outputs go to {target.path}; give each its own path")
 
 
-def _keep_inputs(target: OutputTarget, key: str, inputs: set[str]) -> None:
+def _keep_inputs(
+    target: OutputTarget, key: str, inputs: set[str], place: Path | None = None
+) -> None:
+    shown = target.path if place is None else place
     if key in inputs:
-        raise OutputError(f"{target.path}: is read by this command; write the result elsewhere")
+        raise OutputError(f"{shown}: is read by this command; write the result elsewhere")
     if key.endswith((".yaml", ".yml")) and Path(key).is_file():
         raise OutputError(
-            f"{target.path}: a YAML file is there, perhaps a spec or a catalog; "
+            f"{shown}: a YAML file is there, perhaps a spec or a catalog; "
             f"write {target.format} elsewhere"
         )
 

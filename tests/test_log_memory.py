@@ -1,0 +1,47 @@
+"""A long log takes the memory of the rows that are kept of it, not of all its rows."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+COLUMNS = [f"{what}_{axis}_m" for what in ("position", "reference") for axis in
+           ("north", "east", "down")]  # fmt: skip
+COLUMNS += ["velocity_north_mps", "velocity_east_mps", "velocity_down_mps"]
+COLUMNS += ["roll_deg", "pitch_deg", "yaw_deg"]
+PEAK = """
+import resource, sys
+from pathlib import Path
+from syncline_design.logs import tables
+from syncline_design.logs.row_choice import thinned
+tables.thinned = lambda files: thinned(files, 20_000)
+for name in sys.argv[1:]:
+    (table,) = tables.read_tables([Path(name)], {}, ("car",))
+    print(table.rows, len(table), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def written(path: Path, rows: int) -> Path:
+    time_s = 0.01 * np.arange(rows)
+    courses = {name: np.sin(1e-3 * (k + 1) * time_s).round(4) for k, name in enumerate(COLUMNS)}
+    pl.DataFrame({"time_s": time_s, **courses}).write_csv(path)
+    return path
+
+
+def test_rows_that_are_not_kept_take_little_memory(tmp_path: Path) -> None:
+    """Four times the rows, as many kept: less than half of what the others' figures would take."""
+    short, long = 100_000, 400_000
+    files = [written(tmp_path / f"{rows}.csv", rows) for rows in (short, long)]
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", PEAK, *map(str, files)],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    read = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    assert read[:, 0].tolist() == [short, long]
+    assert np.all(np.abs(read[:, 1] - 20_000) < 500)
+    whole_kb = (long - short) * (len(COLUMNS) + 1) * 8 / 1024
+    assert read[1, 2] - read[0, 2] < 0.5 * whole_kb
