@@ -89,6 +89,22 @@ def test_nor_does_a_case_whose_file_the_grid_names(tmp_path: Path) -> None:
     assert all("not a regular file" in problem.message for problem in problems)
 
 
+LONG_LISTS = {
+    "strangers owned": ", ".join(f"x{k}" for k in range(12_000)),
+    "one thing owned": ", ".join(["ublox_f9p_rtk"] * 12_000),
+}
+
+
+@pytest.mark.parametrize("listed", LONG_LISTS.values(), ids=LONG_LISTS.keys())
+def test_no_long_list_takes_long_to_refuse(listed: str) -> None:
+    """Every entry was held against all before it, and a like one looked for among all that is."""
+    spec = (ROOT / "specs" / "position_track.yaml").read_text()
+    started = time.process_time()
+    with pytest.raises(BadInput, match=r"owned\[\d+\]: (nothing to own|owned twice)"):
+        load_text(f"{spec}\nowned: [{listed}]\n", ROOT / "specs" / "flooded.yaml")
+    assert time.process_time() - started < 3.0
+
+
 def test_thousands_of_effects_are_refused() -> None:
     """Each acts on every simulated sample: 15 000 of them in 1 MB kept `check` busy for minutes."""
     spec = (ROOT / "specs" / "position_track.yaml").read_text()

@@ -47,14 +47,14 @@ def _unknown_owned(spec: ParsedFile, collection: Collection) -> list[Flaw]:
     methods = {name for section, name in collection.origins if section == "timestamping"}
     wanted = "the id of a sensor, shared hardware or clock"
     problems = []
-    for index, one in owned:
-        if one not in known:
-            hint = did_you_mean(one, known)
-            if one in methods:
-                hint = f"{one} is a timestamping method, which each sensor that uses it pays for"
-            at: KeyPath = ("owned", index)
-            problems.append(problem_at(spec, at, "nothing to own", wanted, one, hint))
-    return problems[:MAX_SUGGESTIONS]
+    unknown = ((index, one) for index, one in owned if one not in known)
+    for index, one in islice(unknown, MAX_SUGGESTIONS):
+        hint = did_you_mean(one, known)
+        if one in methods:
+            hint = f"{one} is a timestamping method, which each sensor that uses it pays for"
+        at: KeyPath = ("owned", index)
+        problems.append(problem_at(spec, at, "nothing to own", wanted, one, hint))
+    return problems
 
 
 def _given_in_place(data: Any) -> Iterator[str]:

@@ -208,10 +208,11 @@ def _duplicates(section: str, key: str, names: list[str]) -> list[Located]:
 
 def _owned_twice(owned: tuple[str, ...]) -> list[Located]:
     """An entry is owned or not: how many pieces there are is not counted."""
+    first = {name: index for index, name in reversed([*enumerate(owned)])}
     return [
         (("owned", index), refusal("owned twice", "each id once", name, "delete it"))
         for index, name in enumerate(owned)
-        if name in owned[:index]
+        if first[name] < index
     ]
 
 
