@@ -94,6 +94,22 @@ def test_many_messages_lost_at_random_are_lost(tmp_path: Path, share: float) -> 
     assert row["lost_messages"].parameters["count"] == np.sum(~kept)
 
 
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_queue_where_a_message_is_lost_is_no_step_of_a_whole_interval(
+    tmp_path: Path, seed: int
+) -> None:
+    """One message in a hundred waits for several intervals and holds up those behind it."""
+    rng = np.random.default_rng(seed)
+    t = even(400.0, 25.0)
+    stuck = np.where(rng.random(t.size) < 0.01, rng.exponential(8e-3, t.size), 0.0)
+    receive = np.maximum.accumulate(t + 0.003 + rng.gamma(2.0, 5e-4, t.size) + stuck)
+    kept = rng.random(t.size) > 0.06
+    kept[[0, -1]] = True
+    row = found(said(tmp_path, t[kept], receive[kept]))
+    assert set(row) == {"lost_messages"}
+    assert row["lost_messages"].parameters["count"] == pytest.approx(np.sum(~kept), rel=0.01)
+
+
 def test_messages_left_out_by_a_pattern_are_not_lost(tmp_path: Path) -> None:
     t = even(90.0, 60.0)
     kept = np.cumsum(np.tile([3, 3, 4], t.size))

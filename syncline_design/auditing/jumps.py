@@ -37,6 +37,8 @@ _GRAINS: Final = 2.2  # of the coarser time: both its values lie on a grid
 _ALONE: Final = 8.0  # times what the intervals around it are off by
 _REPEATED: Final = 0.9  # of an episode's stamps: old messages that are sent again
 _LEAST_S: Final = 2e-5
+_CHANCE: Final = 12.0  # of the delays' spread: so late a queue may make messages
+_QUEUE: Final = 64  # messages, which hardly a queue holds up
 _SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
 _BACK: Final = 0.3  # of a jump: what returns by more settles, and is no step
 _LEAST_SETS: Final = 6  # jumps that come in a beat
@@ -169,9 +171,24 @@ def _sizes(
         size = interval - count * pace.period_s
         least = max(floor, _LEVEL * sure, _SLOW * count * pace.period_s)
         clear = 3.0 * sure < 0.5 * pace.period_s
-        if clear and abs(size) > least and abs(size + moved) < _ALIKE * abs(size) + 2.0 * sure:
+        alike = _ALIKE * abs(size) + 2.0 * sure
+        if not (clear and abs(size) > least and abs(size + moved) < alike):
+            continue
+        apart_s = abs(size - round(size / pace.period_s) * pace.period_s)
+        whole = apart_s <= max(_JITTER * pace.jitter_s, _LEAST_S)
+        chance = whole and abs(size) < _CHANCE * width
+        if not chance or abs(size + _floor(*sides)) < alike:
             found.append(Jump(int(k) + 1, size if uneven < 2.0 * sure else -moved))
     return found
+
+
+def _floor(before: Array, after: Array) -> float:
+    """By how much the quicker of many messages are later: a queue that forms where one is lost
+    holds up a dozen, a clock that jumped by a whole interval all of them."""
+    if min(before.size, after.size) < 2 * _BESIDE:
+        return 0.0
+    one, other = (np.percentile(x, 25.0) for x in (before[-_QUEUE:], after[:_QUEUE]))
+    return float(other - one)
 
 
 def _lasting(found: list[Jump], times: Array, late: Array) -> list[Jump]:
