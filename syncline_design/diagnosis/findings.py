@@ -25,6 +25,7 @@ from syncline_design.diagnosis.noise import (
 )
 from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch, readings_words
 from syncline_design.diagnosis.scene import Scene
+from syncline_design.diagnosis.search import VARIES
 from syncline_design.diagnosis.sensor_tails import sensor_tails
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.spans import span_of
@@ -40,7 +41,6 @@ Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
 ONE_VALUE = 0.001  # chance below which a parameter is not one value along the log
-VARIES = 0.1  # of its value, by which it has to vary to be said to
 EDGE_SHARE = 0.02  # of the log
 MOST_NATS = 300.0
 NOT_SEEN = "(not seen)"
@@ -197,7 +197,7 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
     named = _finding(final, one.effect, one.label, found, size_m, weights)
     if _at_the_edge(final, one) or one.label in final.refuted:
         named = replace(named, kind="stand_in")
-    return replace(_in_its_part(named, one.effect), varying=_varying(final, one))
+    return _along_the_log(final, one, _in_its_part(named, one.effect))
 
 
 def _in_its_part(named: Finding, effect: Effect) -> Finding:
@@ -222,6 +222,26 @@ def _at_the_edge(final: Settled, one: Acting) -> bool:
     near = EDGE_SHARE * float(since[-1])
     places = [float(one.values[p.name]) for p in one.effect.parameters if p.located]
     return any(bool(np.min(np.abs(ends - place)) < near) for place in places)
+
+
+def _along_the_log(final: Settled, one: Acting, named: Finding) -> Finding:
+    """The finding with how it varies: slowly by quarters, quickly by how much within how long."""
+    varying, quick = _varying(final, one), final.wandering.get(one.label)
+    if varying is not None:
+        return replace(named, varying=varying, sentence=f"{named.sentence}, varying along the log")
+    if quick is None:
+        return named
+    unit = one.effect.slopes()[0].unit
+    by, within = format_estimate(quick.std, None, unit), format_estimate(quick.over_s, None, "s")
+    return replace(
+        named,
+        sentence=f"{named.sentence}, varying by {by} within {within}",
+        varying=tuple(
+            Stretch(a, b, value, format_estimate(value, None, unit)) for a, b, value in quick.values
+        ),
+        varying_std=estimate(quick.std, None, unit),
+        varying_over_s=quick.over_s,
+    )
 
 
 def _varying(final: Settled, one: Acting) -> tuple[Stretch, ...] | None:

@@ -119,7 +119,8 @@ class Finding(Record):
     stand-in is the best word for something that the dictionary does not hold.
     material: whether it matters, by its own RMS size_m on this log or by what it does to the
     requirements.  probability: posterior odds inside the class with its aliases.
-    varying: its one parameter in four quarters of the log, where it is not one value.
+    varying: its one parameter in four quarters of the log, where it is not one value; where it is
+    another one every varying_over_s, in stretches so long, varying_std their standard deviation.
     also: other sensors that share it, of a delay of a whole system.
     from_s, to_s: the stamps between which it acts, where it does so in a part of the log alone.
     readings: of a sensor's noise, deviations over the spec's by reading, where they are unlike.
@@ -147,6 +148,8 @@ class Finding(Record):
     size_m: float | None = optional()
     probability: float | None = optional()
     varying: tuple[Stretch, ...] | None = optional()
+    varying_std: Estimate | None = optional()
+    varying_over_s: float | None = optional()
     also: tuple[str, ...] | None = optional()
     from_s: float | None = optional()
     to_s: float | None = optional()

@@ -49,6 +49,7 @@ from syncline_design.diagnosis.unlike_readings import (
     unlike_readings,
     with_unlike,
 )
+from syncline_design.diagnosis.wandering import wanderings
 from syncline_design.effects.record import Effect
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -65,6 +66,7 @@ TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 MOVED = 2.0  # standard uncertainties by which an effect has to move for its rivals to be tried
 PAIRS = 8  # effects two by two that are judged by slow states, the likeliest ones
+VARIES = 0.1  # of an effect's value, by which it has to vary to be said to
 EPISODES = 7  # key of the draws that look for them
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
@@ -180,7 +182,9 @@ class Search:
         def threshold(less: Model) -> float:
             return self.threshold(gram(fine, less, self.free_signatures(less), less.level))
 
-        return settle(fine, start, self.signatures, threshold, self.states, self.stands)
+        final = settle(fine, start, self.signatures, threshold, self.states, self.stands)
+        found = wanderings(final.data, final.model, VARIES, self.settings.seed)
+        return replace(final, wandering=found)
 
     def stands(self, one: Judged, effect: Effect) -> bool:
         """Whether noise of another kind would not show as much of an effect by chance."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted
 from syncline_design.diagnosis.step_form import refuted_steps
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance, seen_in_motion
+from syncline_design.diagnosis.wandering import Wandering
 from syncline_design.effects.record import Effect
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -45,7 +46,8 @@ class Settled:
 
     judged: what noise that is not the model's lets be said of each effect that moves the mean.
     courses: how it runs along the log.  stairs: the model with the strongest effect alone, the
-    strongest two, ... , all of them.  refuted: steps that the data want to be ramps.
+    strongest two, ... , all of them.  refuted: steps that the data want to be ramps.  wandering:
+    effects that are another size every few seconds.
     """
 
     data: Data
@@ -56,6 +58,7 @@ class Settled:
     courses: Mapping[Label, Course | None]
     stairs: tuple[tuple[Label, Model], ...]
     refuted: frozenset[Label] = frozenset()
+    wandering: Mapping[Label, Wandering] = field(default_factory=dict)
 
 
 def settle(

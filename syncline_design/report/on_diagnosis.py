@@ -261,6 +261,18 @@ def _figures_of(one: Finding) -> str:
     return ", ".join(estimate.text for estimate in one.parameters.values())
 
 
+def _varying_text(found: Finding, varying: Sequence[Stretch]) -> str:
+    """How a parameter varies: stretch by stretch, or by how much from one to the next."""
+    if found.varying_std is None or found.varying_over_s is None:
+        return f"It varies along the log: {sentence_list([_stretch_text(one) for one in varying])}."
+    ends = sorted(varying, key=lambda one: one.value)
+    long = numbers.si_quantity(found.varying_over_s, "s", 2)
+    return (
+        f"It varies along the log: by {found.varying_std.text} (standard deviation) from one "
+        f"stretch of {long} to the next, between {ends[0].text} and {ends[-1].text}."
+    )
+
+
 def finding_node(found: Finding) -> Node:
     """One finding: its figures, how sure it is, what else it could be."""
     facts = [(_spaced(split_suffix(n)[0]), _parameter_text(p)) for n, p in found.parameters.items()]
@@ -272,8 +284,7 @@ def finding_node(found: Finding) -> Node:
         *scope_nodes(found),
     ]
     if found.varying:
-        values = sentence_list([_stretch_text(one) for one in found.varying])
-        nodes.append(Text(f"It varies along the log: {values}.", mark="!"))
+        nodes.append(Text(_varying_text(found, found.varying), mark="!"))
     unlikely = [a for a in found.aliases if a.probability is not None and a.probability < RULED_OUT]
     open_ = [a for a in found.aliases if a not in unlikely]
     if open_:
