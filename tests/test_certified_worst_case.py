@@ -51,6 +51,33 @@ def largest(*variables: tuple[float, float], signs: tuple[int, ...]) -> float:
     )
 
 
+def sounding(vehicle: str, v: float, near: float, far: float) -> Stage:
+    """Goes straight at v with true stamps and ranges by sound, whose way nobody corrects for."""
+    roles = [quiet(role, NO_ERROR) for role in ("position", "attitude", "ranging")]
+    roles[2] = replace(roles[2], sound_mps=1500.0, travels=True)
+    first = roles[0] if vehicle == "a" else None
+    platform = Platform(v, 0.0, far, nearest_m=None if near == far else near)
+    arm = (0.0, 0.0, 0.0)
+    return Stage(vehicle, vehicle, platform, first, *roles[1:], arm)
+
+
+@pytest.mark.parametrize(
+    ("fixing", "own"),
+    [((75.0, 75.0), (30.0, 30.0)), ((30.0, 30.0), (75.0, 75.0)), ((60.0, 60.0), (60.0, 60.0)),
+     ((20.0, 90.0), (30.0, 40.0)), ((40.0, 50.0), (10.0, 120.0))],
+)  # fmt: skip
+def test_a_fix_that_is_old_and_an_echo_that_is_late_do_not_add_up(
+    fixing: tuple[float, float], own: tuple[float, float]
+) -> None:
+    """What the second vehicle moves is v |2 r2 - 2 r1| / c over a grid of both distances; the
+    first moves v 2 r1 / c.  Straight ways with true stamps: the bound is reached."""
+    stages = (sounding("a", 2.0, *fixing), sounding("b", 3.0, *own))
+    grid = itertools.product(np.linspace(*fixing, 11), np.linspace(*own, 11))
+    moved = max(abs(2.0 * (other - one)) / 1500.0 for one, other in grid)
+    hand = 2.0 * 2.0 * fixing[1] / 1500.0 + 3.0 * moved
+    assert certified_worst_case_m(System(stages, horizon=LEVEL)) == pytest.approx(hand, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("position", "ranging", "clock", "shift_s"),
     [

@@ -32,7 +32,12 @@ from syncline_design.simulation.noise_shares import (
     surely_keeps,
 )
 from syncline_design.simulation.situations import Situations
-from syncline_design.simulation.statistical import Wanted, statistical_figures
+from syncline_design.simulation.statistical import (
+    Wanted,
+    exceeds_at,
+    statistical_figures,
+    worst_point,
+)
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.acceptance import Simulations
@@ -168,6 +173,47 @@ def test_quantiles_of_unit_trace_by_sampling() -> None:
         assert least <= min(found, isotropic) * 1.001
         assert least >= 0.97 * min(found, isotropic)
     assert math.isclose(least_quantile("vertical", 0.95), 0.99 * 1.959964**2, rel_tol=1e-3)
+
+
+def test_a_situation_that_was_worst_for_another_says_no_at_once() -> None:
+    """At its own worst situation a figure is what it is; elsewhere less; other systems' are none
+    of its situations."""
+    system, wanted = exact_stamps(3), Wanted("vertical", 0.95)
+    (worst,) = statistical_figures(system, (wanted,), seed=0)
+    assert exceeds_at(system, wanted, 0.9999 * worst.value_m, worst)
+    assert not exceeds_at(system, wanted, 1.0001 * worst.value_m, worst)
+    elsewhere = replace(worst, point=Situations(system).starting_points(5, 1)[:, 0])
+    assert not exceeds_at(system, wanted, 0.9999 * worst.value_m, elsewhere)
+    assert not exceeds_at(replace(system, stages=system.stages[:1]), wanted, 0.0, worst)
+
+
+def test_failures_teach_from_situations_that_are_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where every design fails, a handful of situations is searched, not one a design; what has
+    kept a limit is not looked at again under a larger one."""
+    searched: list[Wanted] = []
+
+    def counted(system: System, wanted: Wanted, seed: int) -> np.ndarray:
+        searched.append(wanted)
+        return worst_point(system, wanted, seed)
+
+    monkeypatch.setattr("syncline_design.verdict.cuts.worst_point", counted)
+    raw = drawn(7, ("thu",))
+    raw["requirements"] = [("thu", 0.05)]
+    case = load_text(written(raw, tmp_path), tmp_path / "s.yaml")
+    simulations = Simulations()
+    problem = simulations.problem_of(case)
+    designs = [one for one, *_ in all_designs(problem)]
+    assert problem.judge is not None
+    assert all(problem.judge.judge(problem, one).failed for one in designs)
+    assert len(designs) >= 50
+    assert len(searched) <= 4
+    system = simulations.systems.pop()
+    wanted = Wanted("horizontal", 0.95)
+    assert simulations.figure_keeps(system, wanted, 10.0)
+    monkeypatch.setattr("syncline_design.verdict.acceptance.reached", None)
+    assert simulations.figure_keeps(system, wanted, 11.0)
 
 
 def front_by_hand(raw: Raw) -> list[tuple[float, float]]:

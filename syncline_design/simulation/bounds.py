@@ -207,8 +207,25 @@ def _added(system: System, index: int, known: Known) -> Added:
     position = pair_extra_s(system, index, "position", known)
     attitude = pair_extra_s(system, index, "attitude", known)
     return Added(
-        position + later + _relayed_s(system, index), attitude + later, turn, euler, sight, offset
+        position + _under_way_s(system, index, later), attitude + later, turn, euler, sight, offset
     )
+
+
+def _under_way_s(system: System, index: int, later_s: float) -> float:
+    """By how much a position is too late at most, beside tau [s]: by 2 r / c of the stage's own
+    ranging, less 2 r / c of the ranging that fixed it, at any distance of both."""
+    relayed_s = _relayed_s(system, index)
+    if not relayed_s:
+        return later_s
+    least = later_s * near_share(system.stages[index]) - relayed_s
+    most = later_s - relayed_s * near_share(system.stages[index - 1])
+    return max(abs(least), abs(most))
+
+
+def near_share(stage: Stage) -> float:
+    """The near end of a stage's distances over the far end."""
+    near, far = stage.platform.nearest_m, float(stage.platform.distance_m)
+    return 1.0 if near is None else float(near) / far
 
 
 def _relayed_s(system: System, index: int) -> float:

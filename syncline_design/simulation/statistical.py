@@ -19,7 +19,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
-from syncline_design.simulation.ascent import Ascent, Index
+from syncline_design.simulation.ascent import Ascent, FreeVector, Index
 from syncline_design.simulation.lattice import MANY_POINTS, POINTS, sphere_lattice
 from syncline_design.simulation.settings import demand_simulable
 from syncline_design.simulation.situations import Moments, Situations
@@ -66,8 +66,8 @@ class Wanted:
 class Worst:
     """The largest value [m] of a figure, and the situation in which it stands (p,).
 
-    weighted_m: the value times `Wanted.weight`, what is largest there; distance_m: of the last
-    stage's object there.
+    blocks: what the situation chooses; weighted_m: the value times `Wanted.weight`, what is largest
+    there; distance_m: of the last stage's object there.
     """
 
     wanted: Wanted
@@ -75,6 +75,7 @@ class Worst:
     point: Array
     weighted_m: float
     distance_m: float
+    blocks: tuple[FreeVector, ...] = ()
 
 
 def statistical_figures(
@@ -142,6 +143,17 @@ def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int) ->
     return rays(moments, wanted, situations.dimensions).within(least) < wanted.p
 
 
+def exceeds_at(system: System, wanted: Wanted, limit_m: float, worst: Worst) -> bool:
+    """Whether a figure exceeds a limit where that of another system was worst; False where the
+    situation is none of this system's."""
+    situations = Situations(system)
+    if situations.blocks != worst.blocks:
+        return False
+    nodes = situations.nodes(POINTS if situations.linear else MANY_POINTS)
+    moments = situations.moments(worst.point[:, None], nodes)
+    return _evaluated(situations, wanted, worst.point, moments).weighted_m > limit_m
+
+
 def worst_point(system: System, wanted: Wanted, seed: int) -> Array:
     """A situation (p,) in which a figure is about as large as anywhere."""
     return _worst_points(Situations(system), (wanted,), seed)[:, 0]
@@ -205,7 +217,8 @@ def _evaluated(situations: Situations, wanted: Wanted, point: Array, moments: Mo
     """A figure at a point (p,) of these moments."""
     value, at = exact(moments, wanted, situations.dimensions), point[:, None]
     weighted = float(np.max(value * wanted.weight(situations, at)))
-    return Worst(wanted, value, point, weighted, float(situations.last_ranges_m(at)[0]))
+    away = float(situations.last_ranges_m(at)[0])
+    return Worst(wanted, value, point, weighted, away, situations.blocks)
 
 
 def propagated(situations: Situations, point: Array) -> tuple[Array, Array]:

@@ -26,17 +26,18 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.simulation.run import DEFAULT_CAP
-from syncline_design.simulation.statistical import Wanted
+from syncline_design.simulation.statistical import Wanted, Worst
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS, Requirement
-from syncline_design.verdict.cuts import MOST_LEARNED, Learned, learned
+from syncline_design.verdict.cuts import MOST_LEARNED, Failed, Learned, learned
 from syncline_design.verdict.grown import noise_alone, with_grown, without_names
-from syncline_design.verdict.stated import Certified, reached_m, stated, value_m, wanted_of
+from syncline_design.verdict.stated import Certified, reached, stated, value_m, wanted_of
 from syncline_design.verdict.worst_cuts import Taught, taught
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
 WHAT_IF_CAP = 400_000  # samples after which a what-if is left open, and so not offered
+MOST_REMEMBERED = 2  # situations of a figure in which the last designs were worst
 MOST_SIMULATED = 1000  # different systems simulated for one command before it gives up
 
 
@@ -89,6 +90,8 @@ class Simulations:
     asked: Case | None = None  # the spec itself; every other one is a what-if
     learned: list[Learned | Taught] = field(default_factory=list)
     figures: dict[tuple[System, Wanted | Certified], float] = field(default_factory=dict)
+    kept: dict[tuple[System, Wanted | Certified], float] = field(default_factory=dict)
+    worst: dict[Wanted | Certified, tuple[Worst, ...]] = field(default_factory=dict)
 
     def decide(
         self, case: Case, system: System, quantile: float, limit_m: float, *, what_if: bool
@@ -110,15 +113,28 @@ class Simulations:
         return kept[key]
 
     def figure_keeps(self, system: System, wanted: Wanted | Certified, limit_m: float) -> bool:
-        """Whether a figure of the error keeps a limit; one that exceeded a larger one does not."""
+        """Whether a figure of the error keeps a limit; one that exceeded a larger one does not,
+        one that kept a smaller one does."""
         key = (without_names(system), wanted)
         if self.figures.get(key, 0.0) > limit_m:
             return False
         if isinstance(wanted, Wanted):  # the certified one takes next to no time
             self.count(system)
-        found = reached_m(key[0], wanted, limit_m, self.seed)
+        if self.kept.get(key, math.inf) <= limit_m:
+            return True
+        found = self._reached_m(key[0], wanted, limit_m)
         self.figures[key] = max(found, self.figures.get(key, 0.0))
+        if found <= limit_m:
+            self.kept[key] = limit_m
         return found <= limit_m
+
+    def _reached_m(self, system: System, wanted: Wanted | Certified, limit_m: float) -> float:
+        """What a figure reaches; situations that were worst for others are looked at first."""
+        known = self.worst.get(wanted, ())
+        value, worst = reached(system, wanted, limit_m, self.seed, known)
+        if worst is not None:
+            self.worst[worst.wanted] = (worst, *known)[:MOST_REMEMBERED]
+        return value
 
     def count(self, system: System) -> None:
         """One more system to simulate; Unfinished once there were too many."""
@@ -223,7 +239,7 @@ class _SpecJudge:
         for name, limit in self.limits:
             status = self._status(system, name, limit, what_if=what_if)
             if status == "fail":
-                self._learn(system, name)
+                self._learn(problem, design, system, name)
                 return SimulatedJudgement(failed=(name,))
             left_open += [name] if status == "indeterminate" else []
         return SimulatedJudgement(undecided=tuple(left_open))
@@ -258,7 +274,7 @@ class _SpecJudge:
                 refuse_trajectory(self.case, str(error))
             return "indeterminate"
 
-    def _learn(self, system: System, name: str) -> None:
+    def _learn(self, problem: Problem, design: Design, system: System, name: str) -> None:
         """Remember where a system failed a figure, for all that come after it.
 
         Known effects that displace by their own only make errors larger (T. W. Anderson); those
@@ -268,14 +284,18 @@ class _SpecJudge:
         if requirement.kind not in STATED_KINDS or self._noise_depends():
             return
         wanted, bare, seed = wanted_of(requirement), without_names(system), self.simulations.seed
-        alike = (one for one in known if one.case is self.case and one.requirement == name)
-        if sum(1 for _ in alike) >= MOST_LEARNED:
+        alike = [one for one in known if one.requirement == name]
+        if sum(1 for one in alike if one.case is self.case) >= MOST_LEARNED:
             return
         if isinstance(wanted, Certified):
             at = stated(bare, wanted, float(requirement.limit), seed)
             known.append(taught(self.case, self.asked, bare, name, (wanted, at)))
         elif not self._noise_is_changed() and not may_be_underway(self.case):
-            known.append(learned(self.case, self.asked, bare, name, wanted, seed))
+            limit_m = dict(self.limits)[name]
+            failed = Failed(self.case, self.asked, problem, design, bare, name, wanted, limit_m)
+            lessons = [one for one in alike if isinstance(one, Learned) and one.wanted == wanted]
+            lesson = learned(failed, lessons, seed)
+            known += [] if lesson is None else [lesson]
 
     def _requirement(self, name: str) -> Requirement:
         return next(one for one in self.requirements if one.id == name)

@@ -7,15 +7,17 @@ limits, so that it leaves out whole branches and stays exact.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from syncline_design.choice.chosen_system import sigma_of
 from syncline_design.choice.options import Floats
 from syncline_design.choice.table import Cut, Design, Problem
+from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
+from syncline_design.simulation.ascent import FreeVector
 from syncline_design.simulation.noise_shares import NoiseAt, most_noise, noise_at
 from syncline_design.simulation.situations import Situations
 from syncline_design.simulation.statistical import Wanted, worst_point
@@ -25,6 +27,9 @@ MARGIN = 1.01  # by which noise alone exceeds a limit before a design is left ou
 MOST_LEARNED = 64  # situations of one requirement
 SURE = 2.0  # bounds of normal timestamp errors hold k standard deviations, these twice as many
 SAME = 1e-9
+PROMISING = 0.95  # of the sum that rules a design out: from here on its own worst situation may do
+MOST_SEARCHED = 3  # situations of one spec, from where its own is not searched for any more
+MOST_REUSED = 8  # situations of other designs that are tried before one is searched
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +38,8 @@ class Learned:
 
     wanted, weight: the figure, and what its limit at the far end of the distances is divided by
     there; variances: of each role the variances of its sensors per axis, by their numbers; errors:
-    their sensor errors [m] as the spec has them; rates: the turn rate of each stage [rad/s].
+    their sensor errors [m] as the spec has them; rates: the turn rate of each stage [rad/s]; point,
+    blocks: the situation, and what of a system it chooses.
     """
 
     case: Case
@@ -44,6 +50,8 @@ class Learned:
     variances: tuple[Floats, ...]
     errors: tuple[Floats, ...]
     rates: tuple[float, ...]
+    point: Array
+    blocks: tuple[FreeVector, ...]
 
     def cut(self, problem: Problem, limit_m: float) -> Cut:
         """The limit on a sum that it means for the options of a problem."""
@@ -62,6 +70,10 @@ class Learned:
 
     def rules_out(self, problem: Problem, design: Design, limit_m: float) -> bool:
         """Whether a design fails the limit by the noise of its sensors here."""
+        return self.share(problem, design, limit_m) > 1.0
+
+    def share(self, problem: Problem, design: Design, limit_m: float) -> float:
+        """The noise of a design's sensors here over the largest with which it may keep a limit."""
         taus = {r: float(problem.roles[r].options.tau[p]) for r, p in enumerate(design.options)}
         turns = self._turns_rad(problem, taus)
         total = 0.0
@@ -70,7 +82,7 @@ class Learned:
             if table.options.error[place] >= self.errors[r][number] * (1.0 - SAME):
                 share = self.noise.least((table.stage, table.role), turns)
                 total += float(self.variances[r][number] @ share)
-        return total > self.most(limit_m)
+        return total / self.most(limit_m)
 
     def _turns_rad(self, problem: Problem, tau_s: Mapping[int, float]) -> dict[int, float]:
         """How far a shift of its attitude turns each stage at most, bounds of all roles given."""
@@ -86,14 +98,63 @@ class Learned:
         return found
 
 
-def learned(
-    case: Case, asked: Problem, system: System, requirement: str, wanted: Wanted, seed: int
-) -> Learned:
-    """What the failure of a system teaches."""
-    point = worst_point(system, wanted, seed)
-    weight = float(np.max(wanted.weight(Situations(system), point[:, None])))
+@dataclass(frozen=True, slots=True, eq=False)
+class Failed:
+    """A design that failed a requirement of a problem, asked as the spec has it."""
+
+    case: Case
+    asked: Problem
+    problem: Problem
+    design: Design
+    system: System
+    requirement: str
+    wanted: Wanted
+    limit_m: float
+
+
+def learned(failed: Failed, known: Sequence[Learned], seed: int) -> Learned | None:
+    """What a failure teaches; nothing where no sum of noise would have ruled the design out.
+
+    Situations in which others failed come first: the worst one is seldom another.  Its own is
+    searched for where none is known, or where the known ones nearly rule it out.
+    """
+    situations = Situations(failed.system)
+    own = [one for one in known if one.case is failed.case]
+    reused = [
+        _learned_at(failed, situations, one.point)
+        for one in _apart(known, own)
+        if one.blocks == situations.blocks
+    ]
+    best = max((_share(failed, one) for one in (*own, *reused)), default=1.0)
+    for one in reused:
+        if _share(failed, one) > 1.0:
+            return one
+    if best < PROMISING or len(own) > MOST_SEARCHED:
+        return None if own else reused[0]
+    return _learned_at(failed, situations, worst_point(failed.system, failed.wanted, seed))
+
+
+def _share(failed: Failed, one: Learned) -> float:
+    return one.share(failed.problem, failed.design, failed.limit_m)
+
+
+def _apart(known: Sequence[Learned], own: Sequence[Learned]) -> list[Learned]:
+    """The latest situations, each once, that are not among a spec's own."""
+    seen = {id(one.point) for one in own}
+    found: list[Learned] = []
+    for one in reversed(known):
+        if id(one.point) not in seen and len(found) < MOST_REUSED:
+            seen.add(id(one.point))
+            found.append(one)
+    return found
+
+
+def _learned_at(failed: Failed, situations: Situations, point: Array) -> Learned:
+    """What a design teaches in a situation."""
+    case, system, wanted = failed.case, failed.system, failed.wanted
+    weight = float(np.max(wanted.weight(situations, point[:, None])))
     variances, errors = [], []
-    for table in asked.roles:
+    for table in failed.asked.roles:
         role = case.stages[table.stage].role(table.role)
         sensors = () if role is None else role.sensors
         sigmas = [sigma_of(one.entry, table.role) for one in sensors]
@@ -102,5 +163,7 @@ def learned(
         error[pool.sensor] = pool.error
         errors.append(error)
     rates = tuple(float(stage.platform.omega_max_radps) for stage in system.stages)
-    noise = noise_at(system, wanted, point)
-    return Learned(case, requirement, wanted, weight, noise, tuple(variances), tuple(errors), rates)
+    return Learned(
+        case, failed.requirement, wanted, weight, noise_at(system, wanted, point),
+        tuple(variances), tuple(errors), rates, point, situations.blocks,
+    )  # fmt: skip

@@ -20,7 +20,7 @@ from syncline_design.model.roles import RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
 from syncline_design.model.timing import Constant, Empirical, Normal, TimingError, Uniform, mean
 from syncline_design.model.underway import underway
-from syncline_design.simulation.bounds import azimuth_apart
+from syncline_design.simulation.bounds import azimuth_apart, near_share
 from syncline_design.simulation.figures import with_sensors_at
 from syncline_design.verdict.explain_shared import Worked, apart
 from syncline_design.verdict.explain_sheet import (
@@ -294,11 +294,20 @@ def _added_shift(at: _At, role: RoleName) -> str:
         own = (at.before.name, "ranging")
     keys = [own] if stage.ranging is None else [own, (stage.name, "ranging")]
     parts = [number(known[key]) for key in keys if known.get(key)]
-    parts += _numbers(at, at.index, lambda what: what.shift_s)
-    if role == "position" and at.index:
-        parts += _numbers(at, at.index - 1, lambda what: what.relayed_s)
+    later = list(_numbers(at, at.index, lambda what: what.shift_s))
+    relayed: list[str] = []
+    if role == "position" and at.before is not None:
+        relayed = list(_numbers(at, at.index - 1, lambda what: what.relayed_s))
+    parts += _net(at, total(later), total(relayed)) if relayed else later
     formula = "what known effects and sound under way add to it"
     return at.line(f"added_{role}", formula, total(parts), "s")
+
+
+def _net(at: _At, later: str, relayed: str) -> list[str]:
+    """The stage's own 2 r / c less that of the fix, at the ends of both distances."""
+    assert at.before is not None
+    own, fixed = number(near_share(at.stage)), number(near_share(at.before))
+    return [f"max(abs(({later}) * {own} - ({relayed})), abs({later} - ({relayed}) * {fixed}))"]
 
 
 def _scatters(one: Acting) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -13,7 +14,13 @@ from syncline_design.model.system import UTC, Sensor, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.figures import worst_case_m
 from syncline_design.simulation.noise_shares import surely_keeps
-from syncline_design.simulation.statistical import Wanted, Worst, figure, surely_exceeds
+from syncline_design.simulation.statistical import (
+    Wanted,
+    Worst,
+    exceeds_at,
+    figure,
+    surely_exceeds,
+)
 from syncline_design.spec.requirement import DistanceLimit, Requirement
 
 _GRID, _ZOOMS = 32, 4
@@ -111,20 +118,32 @@ def moved(system: System, distance_m: float) -> System:
     return replace(system, stages=(*system.stages[:-1], at_distance(last, distance_m)))
 
 
-def reached_m(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> float:
-    """A value [m] that a figure reaches: above a limit only if the figure exceeds it.
+def reached(
+    system: System,
+    wanted: Wanted | Certified,
+    limit_m: float,
+    seed: int,
+    worst: Sequence[Worst] = (),
+) -> tuple[float, Worst | None]:
+    """(a value [m] that a figure reaches: above a limit only if the figure exceeds it; where).
 
-    What fails at once is not searched any further, nor what keeps the limit by norms alone.
+    What fails at once is not searched any further, nor what keeps the limit by norms alone, nor
+    what fails where others were worst (worst), which a search would only find again.
     Designs that differ in timestamps alone share the verdict on their noise: independent errors
     never make a symmetric, unimodal one less dispersed (T. W. Anderson, Proc. AMS 6, 1955).
     """
     if isinstance(wanted, Wanted) and surely_keeps(system, wanted, limit_m):
-        return 0.0
+        return 0.0, None
     if not acts(system) and _noise_fails(_well_timed(system), wanted, limit_m, seed):
-        return _above(limit_m)
+        return _above(limit_m), None
     if isinstance(wanted, Wanted) and surely_exceeds(system, wanted, limit_m, seed):
-        return _above(limit_m)
-    return value_m(system, wanted, limit_m, seed)
+        return _above(limit_m), None
+    if isinstance(wanted, Wanted) and any(
+        exceeds_at(system, wanted, limit_m, one) for one in worst
+    ):
+        return _above(limit_m), None
+    found = stated(system, wanted, limit_m, seed)
+    return found.weighted_m, found.worst
 
 
 def _above(limit_m: float) -> float:
