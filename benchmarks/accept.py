@@ -86,7 +86,9 @@ def cancelling(role: str) -> Planted:
 
 def turned(role: str, off: tuple[float, float, float]) -> Planted:
     truth = {(role, "mounting"): float(np.radians(np.linalg.norm(off)))}
-    return Planted(f"{role} turned", lambda _: (Fault(turn_deg={role: off}), truth))
+    axis = ("roll", "pitch", "yaw") if role == A else ("azimuth", "elevation", "")
+    words = f"{role} turned in {axis[int(np.argmax(np.abs(off)))]}"
+    return Planted(words, lambda _: (Fault(turn_deg={role: off}), truth))
 
 
 def loud(role: str, keys: Sequence[str], times: float) -> Planted:
