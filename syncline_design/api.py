@@ -242,6 +242,7 @@ def plan(
     diagnosis: what one could not tell apart.  flown: a log held against what is asked.
     """
     from syncline_design.planning import run, setup, wanted
+    from syncline_design.planning.fixed_targets import fixed_targets
     from syncline_design.verdict.pinned import as_measured
 
     seed = _seed(seed)
@@ -254,7 +255,8 @@ def plan(
     files = tuple(_files(flown))
     with _limited(time_limit_s):
         case = as_measured(_case(spec), seed)
-        return run.plan(case, setup.PlanRequest(asked, diagnosis, least, files, seed))
+        fixed = fixed_targets(case)
+        return run.plan(case, setup.PlanRequest(asked, diagnosis, least, files, seed, fixed))
 
 
 def study(

@@ -138,6 +138,62 @@ def test_what_is_asked_is_reached_leg_by_leg(run: PlanRun) -> None:
         assert before.to_s == after.from_s
 
 
+SURVEYED = (
+    (512.0, 181.0, -2.9),
+    (489.5, 222.25, -3.4),
+    (531.0, 214.0, -2.2),
+    (476.0, 190.5, -3.1),
+    (505.0, 243.0, -3.3),
+    (900.0, 200.0, -3.0),  # far from all others
+)
+
+
+def beside_a_survey(folder: Path, rows: list[str]) -> Path:
+    """The spec with a survey of targets among its log's files."""
+    heads = ",".join(("target_id", *(f"target_{axis}_m" for axis in ("north", "east", "down"))))
+    (folder / "survey.csv").write_text("\n".join([heads, *rows, ""]), encoding="utf-8")
+    path = folder / "copter.yaml"
+    files = "log: {files: [survey.csv], "
+    path.write_text(SPEC.replace("log: {", files), encoding="utf-8")
+    return path
+
+
+def test_a_drive_is_laid_beside_targets_that_are_surveyed_already(tmp_path: Path) -> None:
+    """Aimed at is the survey alone, from within reach; sigma by the independent simulator."""
+    rows = [f"P{k},{n},{e},{d}" for k, (n, e, d) in enumerate(SURVEYED)]
+    found = sd.plan(beside_a_survey(tmp_path, rows), reach="latency(position)=2 ms")
+    plan = found.result
+    assert plan.reached
+    assert plan.surveyed
+    used = {(t.north_m, t.east_m, t.down_m): t.name for t in plan.targets}
+    assert used == {p: f"P{k}" for k, p in enumerate(SURVEYED) if p in used}
+    assert SURVEYED[-1] not in used
+    for row in rows_of(found):
+        aimed = tuple(float(row[f"target_{a}_m"] or "nan") for a in ("north", "east", "down"))
+        if not math.isnan(aimed[0]):
+            place = [float(row[f"{a}_m"]) for a in ("north", "east", "down")]
+            assert aimed in used
+            assert math.dist(aimed, place) < LIMITS[2]
+    (bound,) = cramer_rao(
+        world(found), (hidden("latency", "position", latency_s=0.0),), Noise()
+    ).values()
+    assert plan.after[-1].sigma["latency(position).latency_s"] == pytest.approx(bound, rel=0.05)
+    assert ">target P0<" in render_plan("kml", found)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (["A,1,2,3", "A,1,2,4"], "survey.csv:3:1: target A is there twice, at two places"),
+        (["A,1,2,"], "survey.csv:2:1: target A has no whole place"),
+    ],
+)
+def test_a_survey_that_is_not_whole_is_refused(rows: list[str], said: str, tmp_path: Path) -> None:
+    found = CliRunner().invoke(app, ["plan", str(beside_a_survey(tmp_path, rows))])
+    assert found.exit_code == 2
+    assert said in found.output + found.stderr
+
+
 def rows_of(run: PlanRun) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(render_plan("csv", run))))
 

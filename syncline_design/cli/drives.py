@@ -60,6 +60,7 @@ def plan(
 ) -> int:
     """Plan the test drive that tells effects apart, leg by leg, within the platform's limits."""
     deadline = deadline_of(time_limit)
+    from syncline_design.planning.fixed_targets import fixed_targets
     from syncline_design.planning.run import plan as plan_drive
     from syncline_design.planning.setup import PlanRequest
     from syncline_design.report.on_plan import on_plan
@@ -75,7 +76,7 @@ def plan(
         case = load(spec)
         _demand_origin(case, targets)
         found = None if diagnosis is None else _diagnosis(diagnosis)
-        request = PlanRequest(asked, found, minutes, tuple(flown or ()), seed)
+        request = PlanRequest(asked, found, minutes, tuple(flown or ()), seed, fixed_targets(case))
         run = plan_drive(as_measured(case, seed), request)
     emit(console(on_plan(run)), targets, lambda name: render_plan(name, run), quiet=quiet,
          charts=lambda: {"": on_plan(run)})  # fmt: skip

@@ -30,6 +30,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 FAR = 1.6  # root mean square of a row's whitened components, from where on a row counts less
 REWEIGHTED = 1
 LEAST_WEIGHT = 1e-3
+PLAUSIBLE = 2.0  # standard deviation, in bounds of a log, of an effect that its search did not name
 Seen = NDArray[np.bool_]
 TermLabel = tuple[str, str, int, str]  # effect, sensor, stage, parameter
 
@@ -169,12 +170,20 @@ def _freed(
 
 
 def _prior(states: States, total: Array, width: int, level: NoiseLevel) -> Array:
-    """Prior precision of the nuisance and of the courses, their sizes found beside all effects."""
+    """Prior precision of the nuisance and of the courses, their sizes found beside all effects.
+
+    Meanwhile an effect is held to some PLAUSIBLE bounds of its own about where the log's search
+    left it.  Free, it would take what is a slow course of its sensor, and stand in its place in
+    every set of logs; at zero, an effect too small to be named would pass for a slow course.
+    """
     fixed = width + states.courses.shape[2]
     last = total.shape[0] - 1
     order = np.r_[0:width, fixed:last, width:fixed, last]
     free = last - states.courses.shape[2]
-    found = states.shown_prior(total[np.ix_(order, order)], free, level)
+    beside = total[np.ix_(order, order)]
+    effects = np.arange(width, free)
+    beside[effects, effects] *= 1.0 + PLAUSIBLE**-2.0
+    found = states.shown_prior(beside, free, level)
     return np.concatenate([np.zeros(width), found[free:]])
 
 

@@ -32,12 +32,21 @@ class Survey:
     """Surveyed targets: SI columns (n,), and the row of every label that a log may have for one.
 
     A log's label of a target is the figure that its name is, or a hash of the name.
+    names: of the targets as they are written.
     """
 
     path: Path
     header: tuple[str, ...]
     columns: Mapping[str, Array]
     rows: Mapping[float, int]
+    names: tuple[str, ...] = ()
+
+    @property
+    def places(self) -> tuple[tuple[str, ...], Array]:
+        """Every target once: its name, and the figures of its columns (m, 3)."""
+        once = sorted(set(self.rows.values()))
+        whole = np.stack(list(self.columns.values()), axis=1)
+        return tuple(self.names[row] for row in once), whole[once]
 
 
 def is_survey(found: Found) -> bool:
@@ -83,7 +92,7 @@ def survey_of(source: RowSource, found: Found) -> Survey:
     read = source.numbers([found[name][0] for name in wanted], keep)
     columns = {name: read[found[name][0]] * found[name][1] for name in wanted}
     rows = _rows(source.path, ids, lines, columns)
-    return Survey(source.path, source.header, columns, rows)
+    return Survey(source.path, source.header, columns, rows, tuple(one or "" for one in ids))
 
 
 def _ids(source: TextSource, place: int) -> tuple[list[str | None], list[int]]:

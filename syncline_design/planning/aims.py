@@ -1,5 +1,8 @@
 """Where surveyed targets have to be along a drive, and which one is aimed at when.
 
+Where the targets are known, the drive is laid beside them: to the place from which most of them
+are in sight most of the time.
+
 Targets are placed by greedy cover: at every second of the drive one has to be in sight in each
 quarter of the horizon, at a spread of distances.  They are aimed at in turn.
 """
@@ -22,6 +25,8 @@ LEVELS = (-0.04, 0.0, 0.04)  # of d: targets are not all at one height
 QUARTERS = 4
 MOST_PLACES = 4000
 MOST_SAMPLES = 400
+FEW_SAMPLES = 40
+SHIFTS = 11  # each way, that are tried where targets are fixed
 Seen = NDArray[np.bool_]
 
 
@@ -66,6 +71,29 @@ def _placed(vehicle: Vehicle, path_m: Array) -> Array:
         gain = gain - np.sum(needs[:, fresh], axis=1)
         wanted[fresh] = False
     return places[chosen]
+
+
+def beside(vehicle: Vehicle, path_m: Array, targets_m: Array) -> Array:
+    """By how much to shift a path (n, 3) so that targets are in sight: north, east, down [m].
+
+    Counted are the moments from which each quarter of the horizon shows one.  The vehicle keeps its
+    height over the targets' mean level.
+    """
+    few = path_m[np.linspace(0, len(path_m) - 1, min(len(path_m), FEW_SAMPLES)).astype(int)]
+    middle = 0.5 * (path_m.min(axis=0) + path_m.max(axis=0))
+    shift = np.mean(targets_m, axis=0) - middle
+    shift[2] = np.mean(targets_m[:, 2]) - vehicle.depth_m - np.mean(path_m[:, 2])
+    away = 0.5 * np.ptp(targets_m[:, :2], axis=0) + 0.5 * np.ptp(path_m[:, :2], axis=0)
+    away = away + FAR * vehicle.distance_m
+    steps = [np.linspace(-a, a, SHIFTS) for a in away]
+    tried = [np.array([north, east, 0.0]) for north in steps[0] for east in steps[1]]
+    tried.sort(key=lambda one: float(np.hypot(one[0], one[1])))  # of equal ones the nearest
+    seen = [
+        int(np.sum(np.any(_quarters(vehicle, few + shift + one, targets_m), axis=1)))
+        for one in tried
+    ]
+    found: Array = shift + tried[int(np.argmax(seen))]
+    return found
 
 
 def _grid(vehicle: Vehicle, path_m: Array) -> Array:

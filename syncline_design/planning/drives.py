@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -18,6 +19,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
+from syncline_design.planning.aims import beside
 from syncline_design.planning.information import (
     Unknown,
     drift_columns,
@@ -49,7 +51,8 @@ Index = NDArray[np.int64]
 class World:
     """A system with its vehicles: what drives are made and judged in.
 
-    rate_hz: rows a second that the log has.  measured: noise that a diagnosis found.
+    rate_hz: rows a second that the log has.  measured: noise that a diagnosis found.  surveyed:
+    targets that are there already (m, 3) [m]; None: they are put where the drive needs them.
     """
 
     system: System
@@ -70,7 +73,20 @@ class World:
             whole = travelled(vehicle, course)
             count = max(math.floor((len(course) - 1) * STEP_S / step + 1e-9), 1)
             states.append(whole.at(step * np.arange(count + 1, dtype=np.float64)))
-        return drive(self.system, self.vehicles, apart(self.vehicles, states), self.surveyed)
+        return self._beside(apart(self.vehicles, states))
+
+    def _beside(self, states: Sequence[PathStates]) -> Drive:
+        """A drive with what it aims at; beside the targets where they are there already."""
+        if self.surveyed is not None:
+            shift = beside(self.vehicles[-1], states[-1].position_m, self.surveyed)
+            states = [replace(one, position_m=one.position_m + shift) for one in states]
+        return drive(self.system, self.vehicles, states, self.surveyed)
+
+    def turned_about(self, courses: Sequence[CourseCommands]) -> list[Drive]:
+        """A drive of courses at all four headings."""
+        whole = self.driven(courses)
+        every = [turned(whole, QUARTER * h) for h in range(4)]
+        return every if self.surveyed is None else [self._beside(one.states) for one in every]
 
     def view(self, driven: Drive) -> Scene:
         """The log of a drive beside the system."""
@@ -108,8 +124,7 @@ class World:
         for leg in legs:
             in_force().check()
             courses = self.courses_of(leg.stage, leg.course)
-            driven = self.driven(courses)
-            flown += [planned_log(self.system, turned(driven, QUARTER * h)) for h in range(4)]
+            flown += [planned_log(self.system, one) for one in self.turned_about(courses)]
         whole, ends = one_after_another(flown, GAP_S)
         view = scene(self.system, whole, acting_of(self.system))
         noise, slopes = self.noise(view), with_shift(view, self.every)

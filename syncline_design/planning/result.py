@@ -74,12 +74,16 @@ class StandardPlan(Record):
 
 @dataclass(frozen=True, slots=True)
 class PlannedTarget(Record):
-    """A target to survey: its number and place in the local frame [m]."""
+    """A target to survey: its number and place in the local frame [m].
+
+    name: of one that is surveyed already.
+    """
 
     id: int
     north_m: float
     east_m: float
     down_m: float
+    name: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +117,8 @@ class Plan(Record):
     platform tells apart.  confused: effects any of which, left free, would widen what is asked too
     far, though another drive tells them apart.  unseen: what the drive says next to nothing of.
     priors: standard deviations before the drive, SI.  assumed: figures of the platform that the
-    spec does not state.
+    spec does not state.  surveyed: whether the targets were there already, and the drive is laid
+    beside them.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA

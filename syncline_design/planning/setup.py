@@ -17,6 +17,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
 from syncline_design.planning.drives import WholeDrive, World
+from syncline_design.planning.fixed_targets import FixedTargets
 from syncline_design.planning.from_diagnosis import asked_of
 from syncline_design.planning.information import (
     Unknown,
@@ -51,13 +52,17 @@ MOST_OF_ALL: Final = 1e4  # times all legs: what that does not tell apart, no dr
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """What a plan is asked for; none of all: a commissioning drive."""
+    """What a plan is asked for; none of all: a commissioning drive.
+
+    targets: those that are surveyed already.
+    """
 
     asked: PlanWanted = NOTHING_ASKED
     diagnosis: Diagnosis | None = None
     minutes: float = 10.0
     flown: tuple[Path, ...] = ()
     seed: int = 0
+    targets: FixedTargets | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +83,7 @@ class Setup:
         if not (0.0 < request.minutes < math.inf):
             raise PlanError(f"--minutes {to_digits(request.minutes)}: expected more than 0 minutes")
         system = pinned_system(case)
-        world = _world(case, system, request.diagnosis)
+        world = _world(case, system, request)
         asked = _asked(system, world.every, request)
         in_force().doing("looking at the legs")
         noise_m, per_unit = _sizes(world)
@@ -106,10 +111,11 @@ class Setup:
         return bool(np.all(ratios <= 1.0))
 
 
-def _world(case: Case, system: System, diagnosis: Diagnosis | None) -> World:
+def _world(case: Case, system: System, request: PlanRequest) -> World:
     types = tuple("" if s.ranging is None else s.ranging.type for s in system.stages)
-    noise = None if diagnosis is None else diagnosis.noise
-    return World(system, vehicles(case, types), _rate_hz(case, system), noise)
+    noise = None if request.diagnosis is None else request.diagnosis.noise
+    targets = None if request.targets is None else request.targets.places_m
+    return World(system, vehicles(case, types), _rate_hz(case, system), noise, targets)
 
 
 def _rate_hz(case: Case, system: System) -> float:

@@ -20,6 +20,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
 from syncline_design.planning.drives import WholeDrive, World
+from syncline_design.planning.fixed_targets import FixedTargets
 from syncline_design.planning.information import (
     canonical_correlation,
     fisher,
@@ -112,7 +113,7 @@ class Telling:
             noise=_noise_words(self.setup.world),
             priors=dict(zip(self.setup.keys, map(float, self.setup.judge.prior), strict=True)),
             standard=self._standard(found),
-            targets=_targets(found.driven),
+            targets=_targets(found.driven, self.setup.request.targets),
             surveyed=self.setup.world.surveyed is not None,
             assumed=_assumed(self.setup.world),
             origin_deg_m=None
@@ -274,14 +275,16 @@ class Telling:
         )
 
 
-def _targets(driven: Drive) -> tuple[PlannedTarget, ...]:
-    """The targets in use, numbered from 1."""
+def _targets(driven: Drive, fixed: FixedTargets | None) -> tuple[PlannedTarget, ...]:
+    """The targets in use, numbered from 1; those that are surveyed already by their names."""
     if driven.aims is None:
         return ()
-    used = np.unique(driven.aims.aimed[driven.aims.aimed >= 0])
-    return tuple(
-        PlannedTarget(int(k) + 1, *(float(v) for v in driven.aims.targets_m[k])) for k in used
-    )
+    found = []
+    for k in np.unique(driven.aims.aimed[driven.aims.aimed >= 0]):
+        north, east, down = map(float, driven.aims.targets_m[k])
+        name = None if fixed is None else fixed.names[k]
+        found.append(PlannedTarget(int(k) + 1, north, east, down, name))
+    return tuple(found)
 
 
 def _noise_words(world: World) -> str:

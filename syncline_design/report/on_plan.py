@@ -263,8 +263,16 @@ def _targets(found: Plan) -> list[Node]:
         f"{len(found.targets)} targets to survey beforehand, aimed at in turn; places in the local "
         "frame of the drive, whose origin is below its start."
     )
+    if found.surveyed:
+        words = (
+            f"{len(found.targets)} of the targets that are surveyed already, aimed at in turn; the "
+            "drive is laid beside them, in their frame."
+        )
     rows: list[tuple[Cell | str, ...]] = [
-        (str(t.id), *(Cell(numbers.places(v, 1), v) for v in (t.north_m, t.east_m, t.down_m)))
+        (
+            t.name or str(t.id),
+            *(Cell(numbers.places(v, 1), v) for v in (t.north_m, t.east_m, t.down_m)),
+        )
         for t in found.targets
     ]
     heads = ("Target", "North, m #", "East, m #", "Down, m #")

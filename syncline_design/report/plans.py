@@ -113,7 +113,7 @@ def kml(run: PlanRun) -> str:
         _child(line, "coordinates", _coordinates(geodetic(run, run.path.position_m[rows])))
     for target in run.result.targets:
         mark = _child(document, "Placemark")
-        _child(mark, "name", f"target {target.id}")
+        _child(mark, "name", f"target {visible(target.name or str(target.id))}")
         point = _child(mark, "Point")
         _child(point, "altitudeMode", "absolute")
         place = [[target.north_m, target.east_m, target.down_m]]
