@@ -40,6 +40,14 @@ def one_search(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    """A browser for the tests of a file; they are skipped where there is none."""
+    from browsing import launched
+
+    yield from launched()
+
+
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Thousands of collected tests are no garbage: do not look through them again and again."""
     gc.collect()

@@ -19,6 +19,7 @@ import pytest
 from typer.testing import CliRunner
 
 import syncline_design as sd
+from browsing import flaws_of
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.planning.drives import whole_drive
@@ -465,3 +466,10 @@ def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
     pairs = json.loads(from_file.stdout)["pairs"]
     assert pairs[0]["sizes"]["latency_s"] == pytest.approx(0.03, rel=0.1)
     assert all(pair["separated"] for pair in pairs)
+
+
+@pytest.mark.browser
+def test_its_page_is_sound(browser: Any, pair: PlanRun, tmp_path: Path) -> None:
+    path = tmp_path / "plan.html"
+    path.write_text(str(render_plan("html", pair)), encoding="utf-8")
+    assert flaws_of(browser, path) == []

@@ -16,6 +16,7 @@ from scipy.stats import multivariate_normal
 from typer.testing import CliRunner, Result
 
 import syncline_design as sd
+from browsing import flaws_of
 from syncline_design.campaign.changes import REACH, Changes, weight_of
 from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
 from syncline_design.campaign.pool import pool_of
@@ -259,6 +260,16 @@ def test_a_look_that_its_runs_do_not_bear_out_is_not_believed(spec: Path, tmp_pa
     assert document["alarms"][0]["since"]["run"] == 7
     looked(spec, store)  # the next run puts it right
     assert not told(spec, store, tmp_path, 1)["cautions"]
+
+
+@pytest.mark.browser
+def test_its_page_is_sound(browser: object, spec: Path, tmp_path: Path) -> None:
+    change = np.array([9.0, 0, 0, 0, 0]) * BOUND
+    runs = [run_of(one, day) for day, one in enumerate(series(11, 5, change, 3))]
+    path = tmp_path / "watch.html"
+    watch(kept(spec, tmp_path, runs), spec, "-o", f"html:{path}")
+    assert "fig-courses-2" in path.read_text("utf-8")
+    assert flaws_of(browser, path) == []
 
 
 def test_an_accepted_change_is_the_new_baseline(spec: Path, tmp_path: Path) -> None:

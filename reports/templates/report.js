@@ -50,8 +50,14 @@
     table.setAttribute("role", "table");
   });
 
-  // A table that goes on beyond its frame says so.
-  function hint(frame) { frame.classList.toggle("more", frame.scrollWidth > frame.clientWidth + 1); }
+  // A table that goes on beyond its frame stands as cards on a phone, or says so.
+  var phone = window.matchMedia("(max-width: 34rem)");
+  function cut(frame) { return frame.scrollWidth > frame.clientWidth + 1; }
+  function hint(frame) {
+    var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 60;
+    if (phone.matches && few && cut(frame)) { frame.classList.add("cards"); }
+    frame.classList.toggle("more", cut(frame));
+  }
   var frames = Array.prototype.slice.call(document.querySelectorAll(".scroll, .inner"));
   if (window.ResizeObserver) {
     var watch = new ResizeObserver(function (seen) { seen.forEach(function (one) { hint(one.target); }); });

@@ -30,6 +30,8 @@ from syncline_design.cli.shared import NO_VERDICT
 from syncline_design.machine.processes import forget_working_folder
 from syncline_design.machine.streams import say, secure_streams
 
+COMPLETION = "_SYNCLINE_DESIGN_COMPLETE"  # a shell's question: source_bash, complete_bash, ...
+
 
 class _Commands(TyperGroup):
     """The commands; an empty argument (an unset variable, say) is not the working folder."""
@@ -109,6 +111,8 @@ def called(arguments: list[str]) -> typer.Typer:
 
 def main() -> None:
     """Entry point of the `syncline-design` command."""
+    if COMPLETION in os.environ:
+        _complete()
     secure_streams()
     forget_working_folder()
     _start_quickly()
@@ -122,6 +126,15 @@ def main() -> None:
     except OSError as error:  # help, or the version, to a standard output that takes nothing
         say(f"syncline-design: standard output: cannot write: {error.strerror or error}")
         raise SystemExit(NO_VERDICT) from None
+
+
+def _complete() -> None:
+    """Answer a shell that asks how a word goes on, or for the script with which it asks."""
+    from typer.completion import completion_init  # type: ignore[attr-defined]
+
+    forget_working_folder()
+    completion_init()
+    app(prog_name="syncline-design", complete_var=COMPLETION)  # ends the process
 
 
 def _start_quickly() -> None:

@@ -132,7 +132,7 @@ def to_places(value: float, places: int, sign: bool = False) -> str:
     """So many decimals, zeros kept: figures of a column, or of one unit, beside one another."""
     if not math.isfinite(value):
         return _not_finite(value)
-    return f"{value:{'+' if sign else ''}.{places}f}"
+    return f"{value:{'+' if sign else ''}z.{places}f}"  # z: what rounds to zero has no sign
 
 
 def percent(share: float, digits: int = 3) -> str:

@@ -116,6 +116,11 @@ def short_length(value: float) -> str:
     return numbers.length(value, 3)
 
 
+def error_label(limit: numbers.Limited | None) -> Callable[[float], str]:
+    """Tick labels of an axis of errors: in the unit of the limit, where there is one."""
+    return lambda value: "0" if value == 0 else numbers.error(value, limit, 3)
+
+
 def short_time(value: float) -> str:
     """A tick label in seconds' ladder."""
     return numbers.time(value, 3)

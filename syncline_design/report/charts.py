@@ -291,7 +291,7 @@ def ledger(
         labels = [*(t.label for t in terms), "total"]
         scales.set_ticks(axes, "y", range(len(labels)), lambda row: labels[int(row)])
         scales.hide_ticks(axes, "y")
-        _length_ticks(axes)
+        _length_ticks(axes, limit)
         scales.grid(axes, "x")
 
     spoken = "; ".join(f"{t.label} {numbers.length(t.value_m)}" for t in terms)
@@ -349,8 +349,8 @@ def _mark_limit(axes: Axes, limit: numbers.Limited) -> None:
     )
 
 
-def _length_ticks(axes: Axes) -> None:
-    """Linear ticks in the unit ladder of the axis's end."""
+def _length_ticks(axes: Axes, limit: numbers.Limited | None) -> None:
+    """Linear ticks in the unit of the limit, else in the unit ladder."""
     from matplotlib.ticker import MaxNLocator
 
     ticks = [float(t) for t in MaxNLocator(5).tick_values(*axes.get_xlim())]
@@ -359,6 +359,6 @@ def _length_ticks(axes: Axes) -> None:
         axes,
         "x",
         [t for t in ticks if 0 <= t <= high],
-        lambda value: "0" if value == 0 else scales.short_length(value),
+        scales.error_label(limit),
         room=105.0,
     )

@@ -141,12 +141,16 @@ class WhereCells:
     cells: tuple[tuple[float, float, float], ...]
 
 
-def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineChart:
+def largest(maps: Sequence[WhereCells]) -> float:
+    """The largest disagreement of these: charts beside one another share its scale."""
+    return max((score for m in maps for *_, score in m.cells), default=1.0) or 1.0
+
+
+def where_map(maps: Sequence[WhereCells], top: float, name: str = "fig-where") -> InlineChart:
     """Disagreement in standard errors over cells of speed, turn rate, range and so on."""
 
     def build(figure: Figure) -> None:
         rows = figure.subplots(len(maps), 1, squeeze=False)[:, 0]
-        top = max((score for m in maps for *_, score in m.cells), default=1.0) or 1.0
         for axes, entry in zip(rows, maps, strict=True):
             axes.spines[["top", "right"]].set_visible(False)
             edges = [entry.cells[0][0], *(high for _, high, _ in entry.cells)]

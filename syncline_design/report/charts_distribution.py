@@ -65,7 +65,8 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineChart:
         top = max(data.density, default=1.0) or 1.0
         for density, low, high in zip(data.density, data.edges_m, data.edges_m[1:], strict=False):
             tell(axes, (low, high), (0.0, density), [
-                ("Error", f"{numbers.length(low, 3)} to {numbers.length(high, 3)}"),
+                ("Error", f"{numbers.error(low, data.limit, 3)} to "
+                          f"{numbers.error(high, data.limit, 3)}"),
                 ("Share of samples", numbers.percent(density * (high - low), 3)),
             ])  # fmt: skip
         axes.stairs(data.density, data.edges_m, fill=True, color=SERIES[0], alpha=0.35, zorder=2)
@@ -73,7 +74,7 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineChart:
         axes.set_ylim(0, top / (0.96 - LEVEL * len(marks)))
         axes.set_xlim(min(data.edges_m[0], 0.0), _room_for(marks, data.edges_m[-1]))
         _vertical_marks(axes, marks)
-        _plain_length_axis(axes)
+        _length_axis(axes, data.limit)
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         axes.set_xlabel("georeferencing error")
@@ -105,10 +106,10 @@ def _vertical_marks(axes: Axes, marks: Sequence[_Mark]) -> None:
         )  # fmt: skip
 
 
-def _plain_length_axis(axes: Axes) -> None:
+def _length_axis(axes: Axes, limit: numbers.Limited | None) -> None:
     from matplotlib.ticker import MaxNLocator
 
     low, high = axes.get_xlim()
     places = [float(t) for t in MaxNLocator(5).tick_values(low, high) if low <= t <= high]
-    scales.set_ticks(axes, "x", places, lambda v: "0" if v == 0 else scales.short_length(v))
+    scales.set_ticks(axes, "x", places, scales.error_label(limit))
     scales.grid(axes, "x")

@@ -53,18 +53,18 @@ def pareto_front(
         axes = add_axes(figure)
         _staircase(axes, points, cost_limit)
         for point in points:
-            tell(axes, point.cost, point.error_m, _says(point, currency))
+            tell(axes, point.cost, point.error_m, _says(point, currency, limit))
         errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
         around = _near(cloud, points, axes.get_xlim()[1])
         errors += [p.error_m for p in around]
-        _cloud(axes, around, currency)
+        _cloud(axes, around, currency, limit)
         if beside is not None:
             errors.append(beside[1])
             _named_mark(axes, *beside, "nearest", WARN)
         axes.set_ylim(min(errors) / 1.5, max(errors) * 1.6)
         _limits(axes, limit, cost_limit, currency)
         low, high = axes.get_ylim()
-        scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.error_label(limit))
         _money_ticks(axes)
         axes.set_xlabel(f"cost [{currency}]")
         axes.set_ylabel("Syncline error" if over == "error" else over)
@@ -84,7 +84,9 @@ def _near(
     return [p for p in cloud if p.cost <= most and p.error_m <= far]
 
 
-def _cloud(axes: Axes, shown: Sequence[FrontMark], currency: str) -> None:
+def _cloud(
+    axes: Axes, shown: Sequence[FrontMark], currency: str, limit: numbers.Limited | None
+) -> None:
     """Other designs: a quiet dot each, a cross for those that break another requirement."""
     for marker, size, breaks in (("o", 3.0, False), ("x", 3.0, True)):
         some = [p for p in shown if p.breaks is breaks]
@@ -92,13 +94,13 @@ def _cloud(axes: Axes, shown: Sequence[FrontMark], currency: str) -> None:
                   alpha=0.45, markersize=size, markeredgewidth=0.7 if breaks else 0,
                   linestyle="none", zorder=1)  # fmt: skip
     for point in shown:
-        tell(axes, point.cost, point.error_m, _says(point, currency))
+        tell(axes, point.cost, point.error_m, _says(point, currency, limit))
 
 
-def _says(point: FrontMark, currency: str) -> list[tuple[str, str]]:
+def _says(point: FrontMark, currency: str, limit: numbers.Limited | None) -> list[tuple[str, str]]:
     named = [("Design", point.words)] if point.words else []
     return [*named, ("Price", numbers.money(point.cost, currency)),
-            ("Error", numbers.length(point.error_m))]  # fmt: skip
+            ("Error", numbers.error(point.error_m, limit))]  # fmt: skip
 
 
 def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None) -> None:

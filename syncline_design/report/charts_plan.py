@@ -34,18 +34,18 @@ def path(run: PlanRun) -> InlineChart:
             if own.size:
                 rows = np.unique(np.r_[own[::step], own[-1], min(own[-1] + 1, len(leg) - 1)])
                 axes.plot(east[rows], north[rows], color=SERIES[k % len(SERIES)], linewidth=1.4)
-                tell(axes, float(east[own[0]]), float(north[own[0]]), [
-                    ("Leg", str(k + 1)), ("Place", f"{numbers.places(east[own[0]], 1)} m east, "
-                                          f"{numbers.places(north[own[0]], 1)} m north"),
-                ])  # fmt: skip
-                axes.text(east[own[0]], north[own[0]], f" {k + 1}")
+                start = float(east[own[0]]), float(north[own[0]])
+                tell(axes, *start, [("Mark", f"leg {k + 1} begins"), ("Place", _place(*start))])
+                axes.annotate(
+                    str(k + 1), start, xytext=(-6, 6), ha="center",
+                    textcoords="offset points", color=SERIES[k % len(SERIES)], weight="bold",
+                    va="center", zorder=5,
+                )  # fmt: skip
         axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
                   "x", color=MUTED, markersize=4)  # fmt: skip
         for k, one in enumerate(run.result.targets, 1):
-            place = (
-                f"{numbers.places(one.east_m, 1)} m east, {numbers.places(one.north_m, 1)} m north"
-            )
-            tell(axes, one.east_m, one.north_m, [("Target", str(k)), ("Place", place)])
+            place = _place(one.east_m, one.north_m)
+            tell(axes, one.east_m, one.north_m, [("Mark", f"target {k}"), ("Place", place)])
         axes.plot(east[:1], north[:1], "o", color=SERIES[0], markersize=4.5)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, m")
@@ -58,6 +58,10 @@ def path(run: PlanRun) -> InlineChart:
         f"{numbers.length(high, 3)} north to south, {len(run.result.targets)} targets"
     )
     return draw("fig-path", "Path from above", spoken, (WIDTH, 340.0), build)
+
+
+def _place(east_m: float, north_m: float) -> str:
+    return f"{numbers.places(east_m, 1)} m east, {numbers.places(north_m, 1)} m north"
 
 
 def after(found: Plan) -> InlineChart:

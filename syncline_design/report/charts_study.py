@@ -159,6 +159,7 @@ def _count_axis(axes: Axes) -> None:
 
 
 SHAPES = "osD^vP"
+FEW, LEAST_MARK = 200, 0.35  # cases whose marks are of full size; and the least share of it
 STEP = 0.06  # of opacity: finer nobody sees
 _VERDICTS = (  # verdicts, marker, colour, word
     (("fails", "infeasible"), "x", BAD, BRIEF["fails"].word),
@@ -173,15 +174,16 @@ def sampled_cases(
     """Cases over two factors: filled ones meet, the stronger the dearer; crosses do not."""
     meeting = [point for point in data.points if point.verdict == "meets"]
     costs = [point.cost for point in meeting if point.cost is not None]
+    size = max(LEAST_MARK, min(1.0, (FEW / max(len(data.points), 1)) ** 0.5))
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         for verdicts, marker, colour, word in _VERDICTS:
             chosen = [(p.x, p.y) for p in data.points if p.verdict in verdicts]
             if chosen:
-                axes.plot(*zip(*chosen, strict=True), marker, color=colour, markersize=5,
+                axes.plot(*zip(*chosen, strict=True), marker, color=colour, markersize=5 * size,
                           label=f"{word} ({len(chosen)})")  # fmt: skip
-        _meeting(axes, data, meeting, costs)
+        _meeting(axes, data, meeting, costs, size)
         for point, words in zip(data.points, says, strict=False):
             tell(axes, point.x, point.y, words)
         _scatter_axis(axes, "x", data.x)
@@ -196,7 +198,8 @@ def sampled_cases(
 
 
 def _meeting(
-    axes: Axes, data: Scatter, meeting: Sequence[ScatterPoint], costs: Sequence[float]
+    axes: Axes, data: Scatter, meeting: Sequence[ScatterPoint], costs: Sequence[float],
+    size: float,
 ) -> None:  # fmt: skip
     """Cases that meet: a shape for each value of what else varies, all of one strength at once."""
     groups: dict[tuple[int, float], list[ScatterPoint]] = {}
@@ -206,8 +209,8 @@ def _meeting(
     for (kind, strength), points in groups.items():
         places = [p.x for p in points], [p.y for p in points]
         shape = SHAPES[kind % len(SHAPES)]
-        axes.plot(*places, shape, markersize=7, markerfacecolor=(SERIES[0], strength),
-                  markeredgecolor=SERIES[0], markeredgewidth=0.8)  # fmt: skip
+        axes.plot(*places, shape, markersize=7 * size, markerfacecolor=(SERIES[0], strength),
+                  markeredgecolor=SERIES[0], markeredgewidth=0.8 * size)  # fmt: skip
     for kind in sorted({kind for kind, _ in groups}):
         count = sum(p.kind == kind for p in meeting)
         which = f": {shortened(data.kinds[kind], 26)}" if data.kinds else ""

@@ -23,6 +23,8 @@ def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         places, begins = _placed(trace)
+        size, unit = _operation(places[-1])
+        places, begins = [p / size for p in places], [p / size for p in begins]
         axes.vlines(places, [p.low_s for p in trace], [p.high_s for p in trace], color=SERIES[0],
                     linewidth=0.8)  # fmt: skip
         axes.plot(places, [0.5 * (p.low_s + p.high_s) for p in trace], ".", markersize=1.6,
@@ -36,7 +38,7 @@ def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
                 axes.axhline(side * bound_s, color=SERIES[1], linewidth=1.2, linestyle=(0, (5, 3)))
         low, high = axes.get_ylim()
         scales.set_ticks(axes, "y", _linear(low, high), _time_or_zero)
-        axes.set_xlabel("hours of operation, sessions one after another")
+        axes.set_xlabel(f"{unit} of operation, sessions one after another")
         axes.set_ylabel("local \N{MINUS SIGN} reference")
         scales.grid(axes, "y")
 
@@ -61,6 +63,12 @@ def _placed(trace: Sequence[TracePoint]) -> tuple[list[float], list[float]]:
         places.append(here)
         before = here
     return places, begins
+
+
+def _operation(last_h: float) -> tuple[float, str]:
+    """The unit of a time of operation that lasts so long: its size in hours, and its name."""
+    known = ((1.0, "hours"), (1.0 / 60.0, "minutes"))
+    return next((one for one in known if last_h >= 3.0 * one[0]), (1.0 / 3600.0, "seconds"))
 
 
 def _linear(low: float, high: float) -> list[float]:
@@ -96,6 +104,7 @@ def sessions(
                          linestyle=((0, (5, 3)), (0, (2, 2)))[k % 2])  # fmt: skip
         _log_times(axes, "y", [v for v in (*values, *(b for _, b in bounds)) if v > 0.0])
         axes.set_xlabel("session")
+        axes.set_xlim(min(numbered) - 0.5, max(numbered) + 0.5)
         _whole_ticks(axes)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=3)
         scales.grid(axes, "y")
@@ -108,7 +117,7 @@ def sessions(
 def _whole_ticks(axes: Axes) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True, min_n_ticks=1))
 
 
 def _log_times(axes: Axes, which: str, values: Sequence[float]) -> None:

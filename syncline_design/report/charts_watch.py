@@ -52,23 +52,27 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
 
 
 def courses(
-    runs: Sequence[WatchedRun], keys: Sequence[Key], since: Mapping[Key, int]
-) -> InlineChart:
+    runs: Sequence[WatchedRun], keys: Sequence[Key], since: Mapping[Key, int],
+    name: str = "fig-courses",
+) -> InlineChart:  # fmt: skip
     """A small panel a parameter: values of single runs with their intervals."""
-    rows = math.ceil(len(keys) / ACROSS)
+    across = min(ACROSS, len(keys))
+    rows = math.ceil(len(keys) / across)
 
     def build(figure: Figure) -> None:
         for place, key in enumerate(keys):
-            axes = add_axes(figure, rows, ACROSS, place + 1)
-            _panel(axes, runs, key, since.get(key))
+            axes = add_axes(figure, rows, across, place + 1)
+            _panel(axes, runs, key, since.get(key), many=across > 1)
 
     changed = ", ".join(f"{e} ({s})" for e, s, *_ in since) or "none"
     spoken = f"{len(keys)} parameters over {len(runs)} runs; changed: {changed}"
-    return draw("fig-courses", "Every effect over the runs", spoken, (WIDTH, HEIGHT * rows + 30.0),
-                build)  # fmt: skip
+    height = HEIGHT * rows + (30.0 if across > 1 else 90.0)
+    return draw(name, "Effects over the runs", spoken, (WIDTH, height), build)  # fmt: skip
 
 
-def _panel(axes: Axes, runs: Sequence[WatchedRun], key: Key, since: int | None) -> None:
+def _panel(
+    axes: Axes, runs: Sequence[WatchedRun], key: Key, since: int | None, *, many: bool
+) -> None:
     points = [(r.run, v) for r in runs for v in r.values if _key(v) == key]
     shown = [(run, v) for run, v in points if v.interval95 is not None]
     scale, unit = _scale([v for _, v in shown], key[3])
@@ -88,7 +92,7 @@ def _panel(axes: Axes, runs: Sequence[WatchedRun], key: Key, since: int | None) 
     if since is not None:
         axes.axvline(since - 0.5, color=BAD, linewidth=1.0, linestyle=(0, (4, 3)))
     effect, sensor, _, parameter = key
-    title = shortened(f"{effect.replace('_', ' ')} ({sensor})", 26)
+    title = shortened(f"{effect.replace('_', ' ')} ({sensor})", 20 if many else 40)
     axes.set_title(title, loc="left", pad=3)
     figure, _, _ = parameter.rpartition("_")
     axes.set_ylabel(f"{figure or parameter}{f', {unit}' if unit else ''}")

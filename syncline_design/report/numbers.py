@@ -75,6 +75,16 @@ def time(value: Any, digits: int = 4) -> str:
     return _shown(value, Dimension.TIME, digits)
 
 
+def duration(seconds: float) -> str:
+    """A time of operation: `202 s`, `1.5 h`."""
+    return typeset(format_duration(seconds))
+
+
+def like(shown: str, value: float, digits: int = 4) -> str:
+    """A figure [SI] in the unit of a shown one: a change beside what has changed."""
+    return typeset(figure_text.format_like(shown, value, digits))
+
+
 def horizon(entry: MissionHorizon) -> str:
     """`1 h, extent 1 km, tilt 10 deg`."""
     extent, tilt = length(entry.extent_m), angle(entry.tilt_rad)

@@ -372,13 +372,19 @@ def _where(found: Diagnosis) -> list[Node]:
     if not lines:
         return []
     short = Items(lines[:MOST_REGIMES], reach="text")
-    chart = [Chart("where", partial(drawings.where_map, maps), caption)] if maps else []
+    half, top = (len(maps) + 1) // 2, drawings.largest(maps)
+    chart = [
+        Chart(name, partial(drawings.where_map, some, top, f"fig-{name}"), caption)
+        for name, some in (("where", maps[:half]), ("where-too", maps[half:])) if some
+    ]  # fmt: skip
     return [*chart, Items(lines, reach="page"), *([short] if found.findings else [])]
 
 
 def _regime_text(one: Regime) -> str:
     """`along track at speed 6.3 m/s to 9 m/s: mean -652 mm, 508 standard errors`."""
     low, high = (numbers.si_quantity(end, one.unit, 3) for end in (one.low, one.high))
+    if one.unit == "s":  # `0.0003 s to 50 s`
+        low = numbers.like(high, one.low, 3)
     place = f"{one.axis}, {_spaced(one.covariate)} {low} to {high}"
     return (
         f"{place}: mean {rms_length(one.mean_m)}, {numbers.number(abs(one.score), 3)} "
@@ -464,4 +470,9 @@ def _rejected(log: LogRead) -> Table | None:
 def _provenance(found: Diagnosis) -> list[tuple[str, str]]:
     file = [] if found.spec is None else [("Spec file", found.spec.file)]
     known = found.provenance.to_json().items()
-    return [*file, *((_spaced(key), str(value)) for key, value in known)]
+    return [*file, *((_spaced(key), _listed(value)) for key, value in known)]
+
+
+def _listed(value: object) -> str:
+    """A setting in words: a list by its entries, an empty one as none."""
+    return (", ".join(map(str, value)) or "none") if isinstance(value, list) else str(value)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 from syncline_design.comparison.diff_result import (
     Cause,
     Diff,
@@ -115,10 +117,25 @@ def signed_change(change: float, unit: str) -> str:
 
 def cause_words(cause: Cause) -> str:
     if cause.old is None:
-        return f"{cause.key} added ({cause.new})"
+        return f"{cause.key} added ({_entries(cause.new or '')})"
     if cause.new is None:
-        return f"{cause.key} removed ({cause.old})"
+        return f"{cause.key} removed ({_entries(cause.old)})"
     return f"{cause.key} {cause.old} to {cause.new}"
+
+
+def _entries(text: str) -> str:
+    """`kind mass, limit 3 kg` of a mapping written as JSON; any other text as it is."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        return text
+    if not isinstance(found, dict):
+        return text
+    return ", ".join(f"{key} {_plain(value)}" for key, value in found.items() if key != "id")
+
+
+def _plain(value: object) -> str:
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
 def _cause_line(cause: Cause) -> str:
@@ -160,19 +177,30 @@ def _error_row(data: Diff) -> tuple[Cell | str, ...]:
         min((row for row in rows if row is not None), key=lambda row: row.limit, default=None)
         for rows in ([entry.old for entry in asked], [entry.new for entry in asked])
     )
-    name, *_, change = _sum_row(data.error)
-    before = Cell(numbers.error(data.error.old, old), data.error.old)
-    return name, before, Cell(numbers.error(data.error.new, new), data.error.new), change
+    before, now = numbers.error(data.error.old, old), numbers.error(data.error.new, new)
+    change = _change(data.error, now)
+    return "Syncline error", Cell(before, data.error.old), Cell(now, data.error.new), change
 
 
 def _sum_row(figure: FigureChange) -> tuple[Cell | str, ...]:
-    change = figure.change
+    now = numbers.in_unit(figure.new, figure.unit)
     return (
-        "Syncline error" if figure.name == "error" else figure.name,
+        figure.name,
         Cell(numbers.in_unit(figure.old, figure.old_unit), figure.old),
-        Cell(numbers.in_unit(figure.new, figure.unit), figure.new),
-        Cell(numbers.MISSING if change is None else signed_change(change, figure.unit), change),
+        Cell(now, figure.new),
+        _change(figure, now),
     )
+
+
+def _change(figure: FigureChange, now: str) -> Cell:
+    """What a sum changed by, in the unit that it is shown in; of money to the cent."""
+    change = figure.change
+    if change is None:
+        return Cell(numbers.MISSING)
+    if figure.unit not in ("m", "kg", "W") or not change:
+        return Cell(signed_change(change, figure.unit), change)
+    sign = "+" if change > 0 else "\N{MINUS SIGN}"
+    return Cell(sign + numbers.like(now, abs(change)), change)
 
 
 def _margins(data: Diff) -> Table | None:

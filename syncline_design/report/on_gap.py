@@ -30,6 +30,7 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.table import Cell, Table, table
 
+NOTHING: Final = 1e-4  # nat a sample that are shown as none
 _SCORES: Final = ("RMS #", "Reduced \u03c7\u00b2 #", "NLL per sample #", "95 % coverage #")
 
 
@@ -90,8 +91,11 @@ def _placebo_text(gap: WholeGap) -> str:
     saved, placebo = gap.nll_saved_per_sample, gap.placebo
     if placebo.nll_saved_per_sample is None or saved is None:
         return ""
-    change = numbers.places(placebo.nll_saved_per_sample.value - saved.value, 4, sign=True)
-    return f"Adding {placebo.added} as well, which was not chosen: {change} nat per sample."
+    change = placebo.nll_saved_per_sample.value - saved.value
+    told = numbers.places(change, 4, sign=True)
+    if abs(change) < NOTHING:
+        told = f"less than {numbers.number(NOTHING, 1)}"
+    return f"Adding {placebo.added} as well, which was not chosen: {told} nat per sample."
 
 
 def _gap_chart(found: Diagnosis) -> list[Node]:

@@ -59,7 +59,8 @@ def on_log(result: LogInspection) -> Document:
 
 
 def _size(streams: int, messages: int) -> str:
-    return f"{numbers.count(streams)} streams, {numbers.count(messages)} messages"
+    many = "s" if streams != 1 else ""
+    return f"{numbers.count(streams)} stream{many}, {numbers.count(messages)} messages"
 
 
 def _outcome(result: LogInspection) -> Outcome:

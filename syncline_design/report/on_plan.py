@@ -8,7 +8,8 @@ from functools import partial
 from typing import Final
 
 from syncline_design.machine.records import with_texts
-from syncline_design.model.quantity import si_name, suffix_unit
+from syncline_design.model.figure_text import format_like, format_quantity
+from syncline_design.model.quantity import si_name, split_suffix, suffix_unit
 from syncline_design.model.unit_table import Dimension
 from syncline_design.planning.result import Flown, Plan, Separated
 from syncline_design.planning.telling import PlanRun
@@ -113,18 +114,43 @@ def _facts(found: Plan) -> Iterator[tuple[str, str]]:
     last = found.after[-1]
     for key, value in last.sigma.items():
         asked = found.tolerance.get(key)
-        words = figure(key, value)
-        yield key, words if asked is None else f"{words} (asked: {figure(key, asked)})"
+        words = figure(key, value, asked)
+        asks = "" if asked is None else f" (asked: {figure(key, asked, asked)})"
+        yield parameter(key), words + asks
     if last.correlation is not None:
         yield "Correlation of the pair", numbers.number(last.correlation, 2)
 
 
-def figure(key: str, value: float | None) -> str:
-    """A figure of a parameter in its unit; what no row depends on is not seen."""
+def figure(key: str, value: float | None, like: float | None = None) -> str:
+    """A figure of a parameter in its unit; what no row depends on is not seen.
+
+    like: a figure of the same column, in whose unit it stands.
+    """
     if value is None or not math.isfinite(value):
         return "not seen"
-    name = key.rpartition(".")[2]
-    return numbers.si_quantity(value, UNITS.get(suffix_unit(si_name(name))[1], ""), 3)
+    dimension = suffix_unit(si_name(key.rpartition(".")[2]))[1]
+    if like is None or dimension not in UNITS:
+        return numbers.si_quantity(value, UNITS.get(dimension, ""), 3)
+    return numbers.typeset(format_like(format_quantity(like, dimension), value, 3))
+
+
+def parameter(key: str) -> str:
+    """`lever_arm(position).x_m` as `lever arm x (position)`."""
+    effect, _, name = key.rpartition(".")
+    kind, _, place = effect.partition("(")
+    own = split_suffix(name)[0]
+    words = kind if kind.endswith(own) else f"{kind} {own}"
+    return f"{words} ({place}".replace("_", " ") if place else key
+
+
+def _column_sizes(found: Plan) -> dict[str, float]:
+    """What gives each parameter's column its unit: what is asked, else its largest figure."""
+    known = [*(one.sigma for one in found.after), found.after[-1].sigma_all]
+    sizes = {}
+    for key in found.after[-1].sigma:
+        values = [one[key] for one in known if math.isfinite(one.get(key, math.inf))]
+        sizes[key] = found.tolerance.get(key) or max(values, default=1.0)
+    return sizes
 
 
 def _legs(found: Plan) -> list[Node]:
@@ -150,10 +176,10 @@ def _path(run: PlanRun) -> list[Node]:
 
 
 def _after(found: Plan) -> list[Node]:
-    keys = list(found.after[-1].sigma)
+    keys, sizes = list(found.after[-1].sigma), _column_sizes(found)
 
     def row(name: str, values: Mapping[str, float], correlation: float | None = None) -> Row:
-        shown = [Cell(figure(k, values[k]) if k in values else "", _sort(values.get(k)))
+        shown = [Cell(figure(k, values[k], sizes[k]) if k in values else "", _sort(values.get(k)))
                  for k in keys]  # fmt: skip
         last = "" if correlation is None else numbers.number(correlation, 2)
         return (name, *shown, Cell(last))
@@ -161,7 +187,7 @@ def _after(found: Plan) -> list[Node]:
     rows = [row(one.leg, one.sigma, one.correlation) for one in found.after]
     rows += [row("asked", found.tolerance)] if found.tolerance else []
     rows.append(row("all effects free", found.after[-1].sigma_all))
-    heads = ("After leg", *(f"{k} #" for k in keys), "Correlation #")
+    heads = ("After leg", *(f"{parameter(k)} #" for k in keys), "Correlation #")
     note = (
         "Standard uncertainties with what is asked and the noise free; the last row with every "
         "effect free that this system can have, within its prior. What has a double (the latencies "
@@ -203,7 +229,7 @@ def _standard(found: Plan) -> list[Node]:
         _standard_row(one.name, found, one.sigma, one.correlation, one.minutes, keys)
         for one in found.standard
     ]
-    heads = ("Plan", "Until reached #", *(f"{k} #" for k in keys), "Correlation #")
+    heads = ("Plan", "Until reached #", *(f"{parameter(k)} #" for k in keys), "Correlation #")
     note = (
         "Until what is asked is reached, and told from every effect that this drive tells it from. "
         "Line plans are taken line by line in their order; the turns between lines count as time, "
@@ -216,12 +242,13 @@ def _standard_row(
     name: str, found: Plan, sigma: Mapping[str, float], correlation: float | None,
     minutes: float | None, keys: list[str],
 ) -> tuple[Cell | str, ...]:  # fmt: skip
+    sizes = _column_sizes(found)
     reached = Cell("never" if minutes is None else _minutes(minutes),
                    _sort(minutes))  # fmt: skip
     return (
         name,
         reached,
-        *(Cell(figure(k, sigma[k]), _sort(sigma[k])) for k in keys),
+        *(Cell(figure(k, sigma[k], sizes[k]), _sort(sigma[k])) for k in keys),
         Cell("" if correlation is None else numbers.number(correlation, 2)),
     )
 

@@ -11,6 +11,7 @@ from syncline_design.report.csv_out import plain_csv
 from syncline_design.report.document import (
     Chart,
     Document,
+    Group,
     Items,
     Node,
     Outcome,
@@ -104,9 +105,10 @@ def _grid(result: Simulation, system: System | None) -> list[Node]:
              "largest error is found by optimization, not by luck of sampling."),
         Text(said),
         *_grid_chart(result.grid),
-        *show(_grid_table(result.grid, reasons=True), silent=True, reach="page"),
         *show(_grid_table(result.grid, reasons=False), silent=True, reach="text"),
         *_causes(result.grid),
+        Group(tuple(show(_grid_table(result.grid, reasons=True), silent=True)), "fold",
+              summary="Worst case and Syncline at every \u03c4, and why they differ", reach="page"),
     ]  # fmt: skip
 
 
@@ -150,9 +152,9 @@ def _causes(grid: tuple[ComparisonRow, ...]) -> list[Node]:
             lines.append(f"\u03c4 {taus}, ratio {ends}: {CAUSES[cause]}")
     if not lines:
         words = "The worst case stays within 2 % of the Syncline over the whole grid."
-        return [Text(words, reach="text")]
-    lead = Text("Where it leaves the Syncline by more than 2 %, and why:", reach="text")
-    return [lead, Items(tuple(lines), reach="text")]
+        return [Text(words)]
+    lead = Text("Where it leaves the Syncline by more than 2 %, and why:")
+    return [lead, Items(tuple(lines))]
 
 
 def _errors(result: Simulation) -> list[Node]:

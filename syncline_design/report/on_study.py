@@ -10,6 +10,7 @@ from syncline_design.report import charts_study, numbers
 from syncline_design.report.document import (
     Chart,
     Document,
+    Group,
     Node,
     Text,
     given,
@@ -47,6 +48,7 @@ from syncline_design.studies.summary import (
 from syncline_design.studies.table import reason
 
 MOST_CASES = 500  # rows of the case table; CSV and Parquet have them all
+MOST_OPEN = 60  # rows of a table that is not folded away
 MOST_FRONTS = 8
 
 
@@ -56,6 +58,10 @@ def on_study(result: StudyResult) -> Document:
     note = (given(result.study.note),) if result.study.note else ()
     winners = show(winners_table(summary), silent=True)
     cases = show(_case_table(summary), silent=True, reach="page")
+    if len(summary.briefs) > MOST_OPEN:
+        count = numbers.count(min(len(summary.briefs), MOST_CASES))
+        words = f"The first {count} cases" if len(summary.briefs) > MOST_CASES else f"{count} cases"
+        cases = [Group(tuple(cases), "fold", summary=words, reach="page")]
     return Document(
         family="Trade study",
         outcome=outcome(result),

@@ -133,7 +133,7 @@ def _facts(result: Timing) -> Iterator[tuple[str, str]]:
         yield "Statistical bound", numbers.time(result.statistical_bound_s)
         yield "Hard bound", numbers.time(result.hard_bound_s)
         yield "With events", numbers.time(result.event_bound_s)
-    yield "Sessions", f"{claim.sessions}, {numbers.number(claim.hours, 3)} h"
+    yield "Sessions", f"{claim.sessions}, {numbers.duration(3600.0 * claim.hours)}"
 
 
 def _doubts(result: Timing) -> list[Node]:

@@ -20,6 +20,7 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.on_verdict import on_verdict, problems
 from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.verdict_charts import tightest_limit
 from syncline_design.report.words import OUTCOMES
 from syncline_design.verdict.tree import Checked, Refused, Verdict
 
@@ -84,6 +85,6 @@ def _answer(verdict: Checked) -> tuple[Cell, Cell, str]:
     tight = verdict_words.tightest(verdict.requirements)
     return (
         Cell(numbers.money(cost, verdict.spec.currency), cost),
-        Cell(numbers.length(total), total),
+        Cell(numbers.error(total, tightest_limit(verdict, "accuracy")), total),
         numbers.MISSING if tight is None else f"{verdict_words.margin_text(tight)} ({tight.id})",
     )

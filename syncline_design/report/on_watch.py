@@ -164,7 +164,7 @@ def _evidence(found: Watch) -> list[Node]:
 
 
 def _effects(found: Watch) -> list[Node]:
-    """The changed effects first, then every other; those of one run have no course."""
+    """The changed effects, then every other, folded; those of one run have no course."""
     runs = [r for r in found.runs if r.values]
     if len(runs) < 2:
         return []
@@ -177,7 +177,20 @@ def _effects(found: Watch) -> list[Node]:
         "Each parameter as every run alone tells it, with its 95 % interval, beside what all runs "
         "name together; a vertical line where a change began."
     )
-    return [Chart("effects", partial(drawings.courses, runs, keys, since), caption)]  # fmt: skip
+    changed = [key for key in keys if key in since]
+    rest = [key for key in keys if key not in since]
+    nodes: list[Node] = []
+    if changed:
+        draw = partial(drawings.courses, runs, changed, since)
+        nodes.append(Chart("effects", draw, caption))
+    half = (len(rest) + 1) // 2
+    others = tuple(
+        Chart(f"others-{k}", partial(drawings.courses, runs, some, since, f"fig-courses-{k}"),
+              "" if changed else caption)
+        for k, some in enumerate((rest[:half], rest[half:]), 1) if some
+    )  # fmt: skip
+    summary = f"Every other parameter ({len(rest)})" if changed else f"Parameters ({len(rest)})"
+    return [*nodes, *([Group(others, "fold", summary=summary)] if others else [])]
 
 
 def _runs(found: Watch) -> list[Node]:

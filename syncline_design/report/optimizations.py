@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from syncline_design.report.choice_csv import optimization_csv
 from syncline_design.report.document import Document, Heading, Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
@@ -32,4 +34,7 @@ def on_optimized(found: Optimized) -> Document:
         more += [Heading("Why not"), *asked]
     for section in figure_front(found):
         more += [Heading(section.title), *section.nodes]
-    return on_verdict(found.verdict, [*more, *hinges_nodes(found.result)])
+    document = on_verdict(found.verdict, [*more, *hinges_nodes(found.result)])
+    parts = (replace(part, folded=part.folded and part.key != "choice")
+             for part in document.sections)  # fmt: skip
+    return replace(document, sections=tuple(parts))

@@ -88,6 +88,7 @@ def _environment() -> Environment:
     )
     environment.filters["spans"] = spans
     environment.filters["breakable"] = _breakable
+    environment.filters["soft"] = _soft
     environment.filters["points"] = _points
     environment.filters["values"] = _values
     environment.filters["drawing"] = Markup  # matplotlib has escaped the texts in it
@@ -113,13 +114,18 @@ def _values(figure: InlineChart, caption: str) -> Table | None:
     """The same as a table; None of a figure that says nothing, or more than anyone reads."""
     if not 0 < len(figure.told) <= MOST_VALUES:
         return None
-    labels = _labels(figure)
+    labels = sorted(_labels(figure), key=lambda one: any(one not in t.says for t in figure.told))
     rows = ([t.says.get(label, "") for label in labels] for t in figure.told)
     return table(caption, labels, rows)
 
 
 def _labels(figure: InlineChart) -> list[str]:
     return list(dict.fromkeys(label for t in figure.told for label in t.says))
+
+
+def _soft(text: str) -> str:
+    """The same for an attribute that a style sheet shows."""
+    return "\N{ZERO WIDTH SPACE}".join(_STEP.split(text))
 
 
 def _breakable(text: str) -> Any:

@@ -27,6 +27,14 @@ def tightest_limit(verdict: Verdict, kind: str) -> RequirementResult | None:
     return min(rows, key=lambda row: row.limit, default=None)
 
 
+def front_limit(verdict: Verdict) -> RequirementResult | None:
+    """The accuracy limit that a front of errors is drawn with; none where missions differ in it."""
+    rows = [row for one in verdict.missions or () for row in one.requirements]
+    if len({row.limit for row in rows if row.kind == "accuracy"}) > 1:
+        return None
+    return tightest_limit(verdict, "accuracy")
+
+
 def lowest_limit(verdict: Verdict, kind: str) -> float | None:
     """The tightest limit of a kind."""
     row = tightest_limit(verdict, kind)
@@ -206,7 +214,7 @@ def choice_chart(verdict: Verdict) -> list[Node]:
     def draw() -> InlineChart:
         from syncline_design.report.charts_front import FrontMark, pareto_front
 
-        limit, price = tightest_limit(verdict, "accuracy"), lowest_limit(verdict, "cost")
+        limit, price = front_limit(verdict), lowest_limit(verdict, "cost")
         drawn = [FrontMark(*point) for point in sorted(points, key=lambda point: point[0])]
         around = [
             FrontMark(one.cost, one.error_m, False, one.payload, bool(one.breaks))
