@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from syncline_design.planning.telling import PlanRun
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
-from syncline_design.report.palette import MUTED, SERIES
+from syncline_design.report.palette import INK, MUTED, SERIES
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def path(run: PlanRun) -> InlineChart:
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
+        starts: list[tuple[float, float]] = []
         for k in range(len(run.result.legs)):
             own = np.flatnonzero(leg == k)
             if own.size:
@@ -36,11 +38,10 @@ def path(run: PlanRun) -> InlineChart:
                 axes.plot(east[rows], north[rows], color=SERIES[k % len(SERIES)], linewidth=1.4)
                 start = float(east[own[0]]), float(north[own[0]])
                 tell(axes, *start, [("Mark", f"leg {k + 1} begins"), ("Place", _place(*start))])
-                axes.annotate(
-                    str(k + 1), start, xytext=(-6, 6), ha="center",
-                    textcoords="offset points", color=SERIES[k % len(SERIES)], weight="bold",
-                    va="center", zorder=5,
-                )  # fmt: skip
+                starts.append(start)
+        for words, at, colour in _numbered(starts, 0.08 * max(wide, high)):
+            axes.annotate(words, at, xytext=(-6, 6), textcoords="offset points", ha="center",
+                          va="center", color=colour, weight="bold", zorder=5)  # fmt: skip
         axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
                   "x", color=MUTED, markersize=4)  # fmt: skip
         for k, one in enumerate(run.result.targets, 1):
@@ -58,6 +59,21 @@ def path(run: PlanRun) -> InlineChart:
         f"{numbers.length(high, 3)} north to south, {len(run.result.targets)} targets"
     )
     return draw("fig-path", "Path from above", spoken, (WIDTH, 340.0), build)
+
+
+def _numbered(
+    starts: Sequence[tuple[float, float]], apart: float
+) -> list[tuple[str, tuple[float, float], str]]:
+    """What stands where legs begin: one label for those less than `apart` apart [m]."""
+    found: list[tuple[str, tuple[float, float], str]] = []
+    for k, start in enumerate(starts):
+        near = next((i for i, (_, one, _) in enumerate(found) if math.dist(one, start) <= apart),
+                    None)  # fmt: skip
+        if near is None:
+            found.append((str(k + 1), start, SERIES[k % len(SERIES)]))
+        else:
+            found[near] = (f"{found[near][0]}, {k + 1}", found[near][1], INK)
+    return found
 
 
 def _place(east_m: float, north_m: float) -> str:
