@@ -1,14 +1,21 @@
-"""Shell completion, as a bash asks for it."""
+"""Habits of a shell: completion, as a bash asks for it, and an example below every help."""
 
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
+from typer.testing import CliRunner
+
+from syncline_design.cli.app import EXAMPLES, app
 
 SCRIPT = """\
 eval "$(_SYNCLINE_DESIGN_COMPLETE=source_bash syncline-design)"
@@ -31,3 +38,21 @@ def test_bash_completes(tmp_path: Path, words: str, wanted: set[str]) -> None:
                           timeout=120, check=True)  # fmt: skip
     assert set(done.stdout.split()) == wanted
     assert done.stderr == ""
+
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_example_of_a_help_is_a_call_of_its_command(name: str) -> None:
+    """It is printed, its words are taken as they stand, and the repository's files are there."""
+    shown = CliRunner().invoke(app, [*name.split(), "--help"], env={"COLUMNS": "200"}).output
+    assert f"syncline-design {name} {EXAMPLES[name]}" in " ".join(shown.split())
+    words = shlex.split(EXAMPLES[name])
+    command: Any = typer.main.get_command(app)
+    for part in name.split():
+        command = command.commands[part]
+    command.make_context(name, words)  # refuses what it does not know
+    for word in words:
+        if re.match(r"(specs|examples)/", word):
+            assert (ROOT / word).is_file()

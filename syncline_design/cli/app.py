@@ -9,6 +9,7 @@ import copy
 import gc
 import os
 import sys
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
@@ -59,25 +60,59 @@ app.add_typer(catalog, name="catalog")
 log = typer.Typer(help="Look into logs of every kind.", no_args_is_help=True)
 app.add_typer(log, name="log")
 
-app.command("check")(design.check)
-app.command("optimize")(design.optimize)
-app.command("simulate")(evidence.simulate)
-app.command("diagnose")(evidence.diagnose)
-app.command("watch")(watching.watch)
-app.command("plan")(drives.plan)
-app.command("study")(design.study)
-app.command("diff")(design.diff)
-app.command("timing")(clocks.timing)
-app.command("audit")(stamps.audit)
-app.command("accept")(acceptance.accept)
-app.command("reproduce")(evidence.reproduce)
-catalog.command("list")(library.catalog_list)
-catalog.command("show")(library.catalog_show)
-catalog.command("check")(library.catalog_check)
-catalog.command("add")(library.catalog_add)
-log.command("inspect")(logs.inspect)
-app.command("schema")(library.schema)
-app.command("init")(library.init)
+EXAMPLES = {  # by command, what its help ends with
+    "check": "specs/uav_corridor.yaml -o html -o junit:result.xml",
+    "optimize": "specs/uav_corridor.yaml --pareto --best 3 -o html",
+    "simulate": "specs/uav_corridor.yaml --samples 100000 -o csv:errors.csv",
+    "diagnose": "examples/hidden_latency.yaml examples/hidden_latency.csv --write-spec found.yaml",
+    "watch": "drone7.jsonl examples/hidden_latency.yaml examples/hidden_latency.csv",
+    "plan": "examples/hidden_latency.yaml --reach 'latency(position)=1 ms' -o html",
+    "study": "specs/studies/uav_distance.yaml -o html -o csv:cases.csv",
+    "diff": "specs/usv_mapping.yaml specs/usv_wire_missing.yaml -o markdown:diff.md",
+    "timing": "/var/log/chrony/tracking.log --spec specs/uav_corridor.yaml -o html",
+    "audit": "examples/hidden_latency.csv --spec examples/hidden_latency.yaml",
+    "accept": "examples/hidden_latency.yaml examples/hidden_latency.csv --only latency",
+    "reproduce": "-o html",
+    "catalog list": "sensors --modality ranging --reach '120 m'",
+    "catalog show": "velodyne_hdl32e",
+    "catalog check": "lab.yaml",
+    "catalog add": "--from-template lidar --to lab.yaml",
+    "log inspect": "examples/hidden_latency.csv --spec examples/hidden_latency.yaml",
+    "schema": "verdict",
+    "init": "survey",
+}
+
+
+def _add(name: str, run: Callable[..., None]) -> None:
+    """A command, by its name after the program's, with an example below its help."""
+    group, _, own = name.rpartition(" ")
+    home = {"": app, "catalog": catalog, "log": log}[group]
+    home.command(own, epilog=f"Example: syncline-design {name} {EXAMPLES[name]}")(run)
+
+
+COMMANDS: dict[str, Callable[..., None]] = {
+    "check": design.check,
+    "optimize": design.optimize,
+    "simulate": evidence.simulate,
+    "diagnose": evidence.diagnose,
+    "watch": watching.watch,
+    "plan": drives.plan,
+    "study": design.study,
+    "diff": design.diff,
+    "timing": clocks.timing,
+    "audit": stamps.audit,
+    "accept": acceptance.accept,
+    "reproduce": evidence.reproduce,
+    "catalog list": library.catalog_list,
+    "catalog show": library.catalog_show,
+    "catalog check": library.catalog_check,
+    "catalog add": library.catalog_add,
+    "log inspect": logs.inspect,
+    "schema": library.schema,
+    "init": library.init,
+}
+for _name, _run in COMMANDS.items():
+    _add(_name, _run)
 
 
 def _print_version(value: bool) -> None:
