@@ -28,7 +28,7 @@ from syncline_design.logs.inspection import inspect_logs
 from syncline_design.report.on_acceptance import on_acceptance
 from syncline_design.report.on_audit import on_audit
 from syncline_design.report.on_diagnosis import on_diagnosis
-from syncline_design.report.on_difference import on_difference
+from syncline_design.report.on_diff import on_diff
 from syncline_design.report.on_log import on_log
 from syncline_design.report.on_paper import on_paper
 from syncline_design.report.on_timing import on_timing
@@ -307,7 +307,7 @@ def difference_page(folder: Path) -> str:
     old.write_text(text, encoding="utf-8")
     text = text.replace("riegl_vux1uav", "velodyne_hdl32e").replace("5 cm", "0.4 m")
     new.write_text(text.replace("kind: mass, limit: 6 kg", "kind: power, limit: 60 W"), "utf-8")
-    return html(on_difference(diff(old, new, CheckSettings(monte_carlo=False))))
+    return html(on_diff(diff(old, new, CheckSettings(monte_carlo=False))))
 
 
 def log_page(folder: Path) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from browsing import Opened
 from study_specs import SPEC, write
 from syncline_design.report.charts_study import cost_map, sampled_cases
 from syncline_design.report.on_study import on_study
@@ -21,7 +22,6 @@ from syncline_design.report.study_words import MOST_ACROSS, heat_table
 from syncline_design.studies import StudyResult, StudySettings, run_study
 from syncline_design.studies.scatter import scatter
 from syncline_design.studies.summary import HeatMap, heat_map, summarise
-from test_report_browser import Opened, browser  # noqa: F401  a fixture
 
 SAMPLE = """\
 study: 1
@@ -166,7 +166,7 @@ def test_a_cell_without_a_verdict_is_not_said_to_fail(tmp_path: Path) -> None:
 
 @pytest.mark.browser
 def test_no_table_of_a_study_is_wider_than_the_page(
-    browser: Any,  # noqa: F811
+    browser: Any,
     tmp_path: Path,
 ) -> None:
     more = WORDS + (
