@@ -126,7 +126,7 @@ def cause_words(cause: Cause) -> str:
 def _entries(text: str) -> str:
     """`kind mass, limit 3 kg` of a mapping written as JSON; any other text as it is."""
     try:
-        found = json.loads(text)
+        found = json.loads(text, parse_float=str, parse_int=str)  # digits as they are written
     except ValueError:
         return text
     if not isinstance(found, dict):
