@@ -206,10 +206,10 @@ def test_what_a_finding_may_be_instead_is_not_shown(found: Diagnosis) -> None:
 
 
 @pytest.mark.parametrize(("size_s", "open_too"), [(0.02, True), (1e-5, False)])
-def test_what_is_broken_has_no_interval_where_more_of_it_may_be_undone(
+def test_the_interval_of_what_is_broken_holds_what_may_be_undone_of_it(
     found: Diagnosis, size_s: float, open_too: bool
 ) -> None:
-    """A lever arm that hides 20 ms of delay leaves the delay's own interval without meaning."""
+    """A lever arm that hides 20 ms of delay: its interval is 20 ms wider on both sides at least."""
     case = load(EXAMPLE)
     verdict = check_loaded(case, CheckSettings(monte_carlo=False))
     name = found.findings[0].stage
@@ -221,8 +221,42 @@ def test_what_is_broken_has_no_interval_where_more_of_it_may_be_undone(
     assert row.status == "broken"
     assert row.measured is not None
     assert row.measured.value == pytest.approx(0.087, abs=0.003)
-    assert (row.measured.low is None) == open_too
+    assert row.measured.low is not None
+    assert row.measured.high is not None
+    wide = row.measured.low < 0.067 and row.measured.high > 0.107
+    assert wide == open_too
+    assert row.measured.high - row.measured.low < (0.05 if open_too else 0.002)
     assert ("undoes it on this log" in row.words) == open_too
+
+
+def test_an_arm_that_a_delay_hides_most_of_has_an_interval_that_it_lies_in(
+    found: Diagnosis,
+) -> None:
+    """7 mm are seen of an arm of 146 mm, the rest is undone: no length is left out, none below 0"""
+    case = load(EXAMPLE)
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    (late,) = [f for f in found.findings if f.effect == "latency"]
+    seen = late.parameters["latency_s"]
+    parts = {
+        f"{axis}_m": replace(seen, value=v, unit="m", interval95=(v - 0.001, v + 0.001))
+        for axis, v in (("x", 0.006), ("y", 0.003), ("z", -0.002))
+    }
+    arm = replace(late, effect="lever_arm", parameters=parts, aliases=())
+    label, delay = ("lever_arm", "position", 0), ("latency", "position", 0)
+    open_too = tuple(
+        LeftOpen(label, late.stage, f"{axis}_m", "m", size, 1e-3, delay)
+        for axis, size in (("x", 0.14), ("y", 0.02))
+    )
+    either = replace(found, findings=(arm,))
+    log = LogEvidence(either, OnPaper(case, ()), late.stage, sight=Sighted(either, open=open_too))
+    [one] = [a for a in assumptions(case, verdict) if (a.role, a.name) == ("position", "lever_arm")]
+    row = by_log(one, log)
+    assert row.status == "broken"
+    assert row.measured is not None
+    assert row.measured.value == pytest.approx(0.007)  # sqrt(6^2 + 3^2 + 2^2) mm
+    assert row.measured.low == 0.0
+    assert row.measured.high is not None
+    assert math.hypot(0.146, 0.023, 0.002) < row.measured.high < 0.2
 
 
 def test_what_holds_has_an_interval_that_what_is_undone_lies_in(

@@ -118,7 +118,8 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     standing = log.parts.standing(one)
     if breaking or (standing is not None and standing.status == "broken"):
         said = _broken(one, breaking, standing, _noise_figure(one, log), _readings(log.split(one)))
-        return _but_for(said, list(log.parts.undone(one, _width(said.measured))))
+        undone = list(log.parts.undone(one, _width(said.measured)))
+        return _but_for(said, undone, log.parts.room_undone(one), one.name == "latency")
     shifted = by_shifts(one, shifts(one, log.found), log.paper)
     if shifted is not None and shifted.status == "broken":
         return shifted
@@ -163,14 +164,28 @@ def _width(figure: MeasuredFigure | None) -> float:
     return figure.high - figure.low
 
 
-def _but_for(said: Judgement, undone: Sequence[str]) -> Judgement:
-    """What is broken, without an interval where more of it may be there and be undone."""
+def _but_for(said: Judgement, undone: Sequence[str], room: float, signed: bool) -> Judgement:
+    """What is broken, with an interval that holds what another departure may undo of it.
+
+    room: how far it may be off with the others free; 0 of what is in another unit, and has no
+    interval then.  signed: of one component; of several none is shorter than 0.
+    """
     if not undone:
         return said
-    value = None if said.measured is None else said.measured.value
     words = f"{said.words}; more of it may be there: {'; '.join(undone)}"
-    figure = None if value is None else MeasuredFigure(value)
-    return replace(said, words=words, measured=figure)
+    return replace(said, words=words, measured=_with_room(said.measured, room, signed))
+
+
+def _with_room(figure: MeasuredFigure | None, room: float, signed: bool) -> MeasuredFigure | None:
+    value = None if figure is None else figure.value
+    if figure is None or value is None:
+        return None
+    if room <= 0.0:
+        return MeasuredFigure(value)
+    low, high = value - room, value + room
+    if figure.low is not None and figure.high is not None:
+        low, high = min(low, figure.low), max(high, figure.high)
+    return MeasuredFigure(value, low if signed else max(low, 0.0), high)
 
 
 def _sensors(finding: Finding) -> tuple[str, ...]:

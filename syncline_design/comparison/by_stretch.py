@@ -17,7 +17,7 @@ from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
-from syncline_design.model.normal import NORMAL_95
+from syncline_design.model.normal import NEARLY_ALL, NORMAL_95
 
 SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show
 TOLD_S: Final = 1.0  # a short stretch whose size is told beside
@@ -148,6 +148,19 @@ class InStretches:
             and self.is_of(each.label[0], (each.label[1],), each.stage, one)
         )
         return max(sizes, default=0.0)
+
+    def room_undone(self, one: Assumed) -> float:
+        """Half the 95 % interval of a departure beside those that others undo on this log; else 0.
+
+        Of several components the root sum of squares, which no length of them exceeds.
+        """
+        sizes: dict[tuple[str, str, int], dict[str, float]] = {}
+        for each in self.open:
+            own = self.is_of(each.label[0], (each.label[1],), each.stage, one)
+            if own and each.unit == one.unit:
+                sizes.setdefault(each.label, {})[each.parameter] = each.size
+        widest = max((math.hypot(*parts.values()) for parts in sizes.values()), default=0.0)
+        return NORMAL_95 / NEARLY_ALL * widest
 
 
 def _sizes(lengths: Sequence[float], worst: Sequence[ShownSize], at: int) -> Iterator[str]:
