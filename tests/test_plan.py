@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import os
 import shlex
 from itertools import pairwise
 from pathlib import Path
@@ -387,6 +388,26 @@ def test_what_cannot_be_planned_is_refused_with_the_reason(
     assert done.exit_code == 2, done.output
     assert said in done.stderr.replace("\n", " ")
     assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"), [("folder", "a folder"), ("pipe", "a pipe"), ("huge", "bytes")]
+)
+def test_a_diagnosis_that_is_no_plain_file_is_refused(
+    kind: str, said: str, spec: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "d.json"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        with path.open("wb") as stream:
+            stream.truncate(2 << 30)  # a hole: takes no place on the disk
+    done = call(spec, "--diagnosis", path, "-q")
+    assert done.exit_code == 2, done.output
+    assert f"--diagnosis {path}: cannot read: " in done.stderr.replace("\n", " ")
+    assert said in done.stderr
 
 
 def test_too_few_minutes_end_with_the_least_that_is_enough(spec: Path) -> None:

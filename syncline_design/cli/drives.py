@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from syncline_design.report.write import OutputTarget
     from syncline_design.spec.case import Case
 
+MOST_BYTES = 64 << 20  # of a diagnosis; the longest logs leave less than a hundredth of that
+
 
 @guarded
 def plan(
@@ -95,18 +97,19 @@ def _asked(separate: tuple[str, str] | None, reach: str | None) -> PlanWanted:
 def _diagnosis(path: Path) -> Diagnosis:
     """A diagnosis read back; BadInput where the file holds none."""
     from syncline_design.diagnosis.result import SCHEMA, Diagnosis
-    from syncline_design.machine.input_files import read_plain
+    from syncline_design.machine.input_files import UnsuitableError, read_plain
     from syncline_design.machine.records import NotThisResultError, read_as
     from syncline_design.planning.wanted import PlanError
 
     try:
-        return read_as(Diagnosis, read_plain(path))
+        return read_as(Diagnosis, read_plain(path, MOST_BYTES))
     except NotThisResultError as error:
         first = str(error).splitlines()[0]
         raise PlanError(f"--diagnosis {path}: expected a diagnosis ({SCHEMA}), as `diagnose "
                         f"--output json:PATH` writes it; found {first}") from None  # fmt: skip
-    except OSError as error:
-        raise PlanError(f"--diagnosis {path}: cannot read: {error.strerror or error}") from None
+    except (OSError, UnsuitableError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise PlanError(f"--diagnosis {path}: cannot read: {reason}") from None
 
 
 def _demand_origin(case: Case, targets: Sequence[OutputTarget]) -> None:
