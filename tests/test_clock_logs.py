@@ -247,6 +247,16 @@ def test_what_is_cut_off_is_said(tmp_path: Path) -> None:
     assert "cut off" in read.notes[0]
 
 
+def test_rows_without_an_offset_are_counted_and_said(tmp_path: Path) -> None:
+    """Every third cell is empty or nan: 34 of 100, too few in a row to be a gap."""
+    cells = [("" if k % 2 else "nan") if k % 3 == 0 else f"1.{k:03d}" for k in range(100)]
+    rows = [f"{1.7e9 + 10.0 * k:.3f},{cell}" for k, cell in enumerate(cells)]
+    table = write(tmp_path / "table.csv", ["time_s,offset_us", *rows])
+    read = read_logs([table])
+    assert len(read.series[0]) == 66
+    assert read.notes == (f"{table}: 34 rows without time or offset left out, the first in line 2",)
+
+
 def test_a_number_that_lost_figures_is_left_out(tmp_path: Path) -> None:
     """0.000123456 cut to 0.00 still reads as a number; whole lines need no end."""
     rows = [f"{1.7e9 + 10.0 * k:.3f},{1.23456e-4 + 1e-9 * k:.9f}" for k in range(100)]

@@ -36,8 +36,8 @@ def _mark(line: str) -> str:
     return max((";", "\t", ","), key=line.count)
 
 
-def read(file: LogFile) -> list[Sheet]:
-    """The one source of a table of offsets."""
+def read(file: LogFile) -> tuple[list[Sheet], list[str]]:
+    """The one source of a table of offsets, and what is said of rows without a figure."""
     numbered = ((n, line) for n, line in enumerate(file.lines, 1)
                 if line.strip() and not line.startswith("#"))  # fmt: skip
     line, header = next(numbered)
@@ -47,6 +47,7 @@ def read(file: LogFile) -> list[Sheet]:
     sheet = Sheet(SourceKind("CSV", "csv", 1, "unknown", "utc"))
     stamps_utc = True
     session: str | None = None
+    empty: list[int] = []
     for number, cells in _split(numbered, mark, file):
         if len(cells) <= max(columns.values()):
             if number == len(file.lines):
@@ -56,7 +57,9 @@ def read(file: LogFile) -> list[Sheet]:
                           found=str(len(cells)))  # fmt: skip
         at = _Cells(file, number, cells, columns, comma)
         row, own = at.row(session)
-        if row is not None:
+        if row is None:
+            empty.append(number)
+        else:
             stamps_utc &= row.time_s > _EARLIEST_UTC
             sheet.add(row)
             session = own
@@ -64,7 +67,9 @@ def read(file: LogFile) -> list[Sheet]:
         raise refused(file.path, "no samples", expected="rows below the header", line=line)
     if not stamps_utc:
         sheet.kind = SourceKind("CSV", "csv", 1, "unknown", "boot")
-    return [sheet]
+    said = (f"{file.path}: {len(empty)} rows without time or offset left out, the first in line "
+            f"{empty[0]}") if empty else ""  # fmt: skip
+    return [sheet], [said] if said else []
 
 
 def _split(

@@ -89,7 +89,7 @@ def is_clock_log(path: Path) -> bool:
 def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:
     name = _format(file)
     if name == "csv":
-        return columns.read(file), []
+        return columns.read(file)
     read = _LINE_READERS[name]()
     found: dict[str, Sheet] = {}
     strange: list[int] = []
