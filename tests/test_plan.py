@@ -8,6 +8,7 @@ import json
 import math
 import os
 import shlex
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,13 +23,16 @@ from typer.testing import CliRunner
 import syncline_design as sd
 from browsing import flaws_of
 from syncline_design.cli.app import app
+from syncline_design.comparison.meaning import DiagnosisAndDesign
 from syncline_design.machine.records import read_as
+from syncline_design.planning import next_drive
 from syncline_design.planning.drives import whole_drive
 from syncline_design.planning.result import Plan
 from syncline_design.planning.search import lasting_s
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.standard import MOST_LEGS, Lines, most_within
 from syncline_design.planning.telling import PlanRun
+from syncline_design.report.diagnoses import render_diagnose
 from syncline_design.report.plans import render_plan
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
@@ -458,15 +462,23 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return spec, log.to_csv(folder / "line.csv")
 
 
-def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
-    straight: tuple[Path, Path],
-) -> None:
+@pytest.fixture(scope="module")
+def diagnosed(straight: tuple[Path, Path]) -> Path:
+    """What `diagnose` says of that line: its JSON, and its text beside it."""
     spec, log = straight
     result = spec.parent / "line.json"
     done = CliRunner().invoke(
         app, ["diagnose", str(spec), str(log), "--max-effects", "1", "-o", f"json:{result}"]
     )
     assert done.exit_code == 1
+    result.with_suffix(".txt").write_text(done.stdout, encoding="utf-8")
+    return result
+
+
+def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
+    straight: tuple[Path, Path], diagnosed: Path
+) -> None:
+    spec, result = straight[0], diagnosed
     data = json.loads(result.read_text("utf-8"))
     jsonschema.validate(data, result_schema("diagnosis"))
     named = {(f["effect"], f["sensor"]): f for f in data["findings"]}
@@ -476,7 +488,9 @@ def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
     assert drive["reached"]
     assert drive["first"] != drive["second"]
     assert drive["command"].startswith("syncline-design plan ")
-    assert drive["command"].removeprefix("syncline-design ")[:30] in " ".join(done.stdout.split())
+    assert drive["command"].removeprefix("syncline-design ")[:30] in " ".join(
+        result.with_suffix(".txt").read_text("utf-8").split()
+    )
     words = shlex.split(drive["command"])[2:]
     whole = call(*words, "-o", "json:-")
     assert whole.exit_code == 0
@@ -487,6 +501,51 @@ def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
     pairs = json.loads(from_file.stdout)["pairs"]
     assert pairs[0]["sizes"]["latency_s"] == pytest.approx(0.03, rel=0.1)
     assert all(pair["separated"] for pair in pairs)
+
+
+def test_a_diagnosis_without_a_drive_says_why_and_prints_the_command_that_looks_for_one(
+    straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec, _ = straight
+    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
+    asked = ["--separate", found.plan.first, found.plan.second] if found.plan else []
+    case = load(spec)
+    monkeypatch.setattr(next_drive, "LIMIT_S", 0.0)
+    late = next_drive.next_drive(case, found)
+    assert late is not None
+    assert (late.legs, late.minutes, late.reached) == ((), None, False)
+    assert shlex.split(late.command) == ["syncline-design", "plan", str(spec), *asked]
+    words = render_diagnose("markdown", replace(found, plan=late)).replace("\\", "")
+    assert "No drive that does was found in the time" in words
+    assert late.command in words
+    jsonschema.validate(replace(found, plan=late).to_json(), result_schema("diagnosis"))
+
+
+def test_a_class_that_no_drive_tells_is_said_to_be_one(
+    straight: tuple[Path, Path], diagnosed: Path
+) -> None:
+    """Two lever arms of one rigid body shift every row alike, whatever is driven."""
+    spec, _ = straight
+    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
+    arms = ("lever_arm", "position"), ("lever_arm", "ranging")
+    one, other = (
+        replace(r, effect=effect, sensor=sensor)
+        for (effect, sensor), r in zip(arms, [found.findings[0].aliases[0]] * 2, strict=True)
+    )
+    alone = replace(found.findings[0], effect=one.effect, sensor=one.sensor, aliases=(other,))
+    ends = next_drive.next_drive(load(spec), replace(found, findings=(alone,)))
+    assert ends is not None
+    assert ends.why_none is not None
+    assert "lever_arm(position) from lever_arm(ranging)" in ends.why_none
+    assert ends.legs == ()
+
+
+def test_a_drive_longer_than_its_minutes_is_not_called_the_best_for_them(pair: PlanRun) -> None:
+    longer = replace(pair.result, reached=False, least_minutes=9.0, minutes=0.05)
+    words = render_plan("markdown", replace(pair, result=longer))
+    assert longer.duration_s > 3.0
+    assert "best for" not in words
+    assert "No drive as short as 0.05 min was found" in words
 
 
 @pytest.mark.browser

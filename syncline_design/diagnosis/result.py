@@ -434,16 +434,19 @@ class NextDrive(Record):
 
     least_minutes: the least that does; minutes, legs: of the drive told here, which does where
     `reached`.  targets: how many to survey.  command: prints the drive whole.
+    why_none: why there is no drive, in words; then minutes is None and legs are empty, and command
+    looks for the drive, or says at length why there is none.
     """
 
     first: str
     second: str
-    minutes: float
+    minutes: float | None
     least_minutes: float | None
     reached: bool
     legs: tuple[str, ...]
     targets: int
     command: str
+    why_none: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -101,6 +101,8 @@ def _drive(plan: NextDrive | None) -> list[Node]:
     """The test drive for a class, in short, and the command that prints it whole."""
     if plan is None:
         return []
+    if plan.minutes is None:
+        return [Text((f"{plan.why_none}: ", code(plan.command)))]
     length = numbers.typeset(f"{numbers.number(plan.minutes, 2)} min")
     words = f"This log cannot tell {plan.first} from {plan.second}. A drive of {length} does:"
     if not plan.reached:

@@ -35,6 +35,7 @@ UNITS: Final = {
     Dimension.ANGULAR_RATE: "rad/s", Dimension.SPEED: "m/s",
 }  # fmt: skip
 Row = tuple[Cell | str, ...]
+FIRST_ORDER: Final = "as far as their effects of first order go"  # a large lag is no latency
 MOST_TARGETS: Final = 12  # told outside the page
 
 
@@ -78,12 +79,14 @@ def _outcome(found: Plan) -> Outcome:
 def _sentences(found: Plan) -> Iterator[str]:
     if not found.reached and found.least_minutes is not None:
         least = _minutes(_upwards(found.least_minutes))
-        yield (
-            f"The least that is enough: {least}. Below is the best for "
-            f"{numbers.number(found.minutes, 6)} min."
-        )
+        given = f"{numbers.number(found.minutes, 6)} min"
+        below = f"Below is the best for {given}."
+        if found.duration_s > 60.0 * found.minutes:
+            length = _minutes(found.duration_s / 60.0)
+            below = f"No drive as short as {given} was found: below is one of {length}."
+        yield f"The least that is enough: {least}. {below}"
     for words in found.inseparable:
-        yield f"No drive of this platform tells {words} apart."
+        yield f"No drive of this platform tells {words} apart, {FIRST_ORDER}."
     if found.reached and not found.confused:
         yield (
             "All that is asked is reached, and none of the other effects that a drive can tell "
@@ -268,7 +271,13 @@ def _flown(flown: Flown | None) -> list[Node]:
 def _open(found: Plan) -> list[Node]:
     nodes: list[Node] = []
     if found.inseparable:
-        nodes.append(Items(tuple(f"{one}: no drive tells them apart" for one in found.inseparable)))
+        nodes.append(
+            Items(
+                tuple(
+                    f"{one}: no drive tells them apart, {FIRST_ORDER}" for one in found.inseparable
+                )
+            )
+        )
     if found.unseen:
         words = "With every effect free, this drive leaves these as uncertain as before: "
         nodes.append(Text(words + ", ".join(found.unseen) + "."))
