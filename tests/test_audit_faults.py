@@ -225,6 +225,33 @@ def test_a_scan_whose_last_point_lies_behind_its_receipt_is_stamped_at_its_end()
     assert (declared.parameters["kind"], declared.counts) == ("declared", False)
 
 
+@pytest.mark.parametrize(
+    ("first", "last", "name"),
+    [(-0.25, -0.15, "end_of_scan"), (0.06, 0.16, "start_of_scan"), (-0.14, -0.13, "end_of_scan")],
+)
+def test_a_stamp_outside_its_own_scan_is_contradicted_by_its_points(
+    first: float, last: float, name: str
+) -> None:
+    """Ten scans a second: from start or end no point lies farther off than 0.1 s."""
+    bench = Bench(rate=10.0)
+    bench.late += 0.4
+    said = only(bench.audited(PointTimes(first, last, 20)), name)
+    assert (said.parameters["kind"], said.counts) == ("contradicted", True)
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.06, 0.09), (-0.05, 0.05), (-1.0, 0.0), (-0.1, 0)])
+def test_cut_outs_and_maps_of_several_scans_contradict_no_stamp(first: float, last: float) -> None:
+    bench = Bench(rate=10.0)
+    bench.late += 0.4
+    assert not any(f.counts for f in bench.audited(PointTimes(first, last, 20)).faults)
+
+
+def test_stamps_ahead_of_receipt_are_said_once_whatever_their_points_say() -> None:
+    bench = Bench(rate=10.0)
+    bench.stamp += 0.3
+    only(bench.audited(PointTimes(-0.3, -0.2, 20)), "ahead_of_receipt")
+
+
 @pytest.mark.parametrize("rate", [10.0, 50.0, 200.0])
 def test_duplicates_of_a_sensor_at_exact_epochs_are_not_taken_for_truncation(rate: float) -> None:
     bench = Bench(rate=rate)

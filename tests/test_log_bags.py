@@ -93,6 +93,23 @@ def test_a_cut_file_is_read_up_to_its_last_good_message(tmp_path: Path, writer: 
     assert len(set(counts)) > 2
 
 
+def test_a_database_shorter_than_its_head_says_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    (path,) = write_ros2(tmp_path / "bag", MADE).glob("*.db3")
+    whole = {s.name: stamps_of(s) for s in open_recording(path).streams()}
+    data = path.read_bytes()
+    counts = []
+    for share in (0.5, 0.8):
+        cut = tmp_path / f"{share}.db3"
+        cut.write_bytes(data[: int(share * len(data))])
+        recording = open_recording(cut)
+        streams = recording.streams()
+        for stream in streams:
+            assert stamps_of(stream) == whole[stream.name][: stream.messages]
+        assert recording.incomplete is not None and all(s.partial for s in streams)
+        counts.append(sum(s.messages for s in streams))
+    assert 0.3 * 3 * len(MADE) < counts[0] < counts[1] < 3 * len(MADE)
+
+
 def stamps_of(stream: Stream) -> list[int]:
     assert stream.stamps is not None
     stamps: list[int] = stream.stamps.primary_ns.tolist()

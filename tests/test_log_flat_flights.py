@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from syncline_design.logs.inspection import inspect_logs
 from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.epochs import WEEK_NS, gps_to_utc, week_start_ns
@@ -169,6 +170,21 @@ def test_axes_that_no_file_tells_are_those_that_fit_the_globe(tmp_path: Path, ax
     late_s, notes = rows_of([fixes, reference], LogChoice.model_construct(origin=origin))
     assert late_s == pytest.approx(LATE_S, abs=1e-3)
     assert any("taken as the latter (log: {frame: ned})" in n for n in notes) == (axes == "ned")
+
+
+def test_the_proposed_block_holds_the_axes_that_the_globe_showed(tmp_path: Path) -> None:
+    """What is proposed gives the rows that were tried, and not those of the axes first assumed."""
+    fixes = made.write_pos(tmp_path / "gnss.pos", FIXES)
+    rows = [f"{t // 10**9}.{t % 10**9:09d} {x:.9f} {y:.9f} {z:.9f} 0 0 0 1"
+            for t, (x, y, z) in zip(TRUTH.stamp_ns.tolist(), TRUTH.place, strict=True)]  # fmt: skip
+    reference = tmp_path / "ref.txt"
+    reference.write_text("\n".join(rows) + "\n")
+    origin = (math.radians(ORIGIN[0]), math.radians(ORIGIN[1]), ORIGIN[2])
+    choice = LogChoice.model_construct(origin=origin)
+    frame = inspect_logs([fixes, reference], choice).proposal.log.frame
+    assert frame == "ned"
+    late_s, _ = rows_of([fixes, reference], choice.model_copy(update={"frame": frame}))
+    assert late_s == pytest.approx(LATE_S, abs=1e-3)
 
 
 @pytest.mark.parametrize("told", [None, "utc", "gps"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ _LEAST_JITTER_S: Final = 5e-6
 _PART: Final = 100  # messages of a part of the log
 _LEAST_PARTS, _MOST_PARTS = 4, 12
 _EVENER: Final = 0.3  # how much more even stamps of the sensor's own are
+_WHOLE_SCANS: Final = 1.25  # how far from its stamp a point of a scan may lie, in scans
 _SKEWED: Final = 0.2  # how much further the late half of the rhythm's scatter reaches
 
 
@@ -249,12 +250,18 @@ def ahead(series: Series, known_s: float, resolution_s: float) -> StampFault | N
     )  # fmt: skip
 
 
-def scan(series: Series, points: PointTimes | None) -> StampFault | None:
-    """Where in a scan its stamp lies, as the times of its points tell."""
+def scan(series: Series, points: PointTimes | None, interval_s: float) -> StampFault | None:
+    """Where in a scan its stamp lies, as the times of its points tell.
+
+    interval_s: between two scans [s].
+    """
     if points is None or points.last_s - points.first_s <= 0.0:
         return None
     length = points.last_s - points.first_s
     parameters: dict[str, float | str] = {"first_s": points.first_s, "last_s": points.last_s}
+    far = _beyond(points, max(length, interval_s), parameters)
+    if far is not None:
+        return far
     at_start = abs(points.first_s) < 0.25 * length
     at_end = abs(points.last_s) < 0.25 * length
     declared = "start_of_scan" if at_start else "end_of_scan" if at_end else None
@@ -273,6 +280,28 @@ def scan(series: Series, points: PointTimes | None) -> StampFault | None:
         name, {**parameters, "kind": "declared"}, None, None,  # type: ignore[arg-type]
         f"stamps are of the scan's {words}: points from {signed(points.first_s * 1e3, 4)} to "
         f"{signed(points.last_s * 1e3, 4)} ms", counts=False,
+    )  # fmt: skip
+
+
+def _beyond(
+    points: PointTimes, scan_s: float, parameters: dict[str, float | str]
+) -> StampFault | None:
+    """A stamp that lies outside its own scan: one of start, middle or end has all within scan_s.
+
+    Cut-outs of a scan have fewer points, none of them farther off.
+    """
+    before, after = -points.first_s, points.last_s
+    if max(before, after) <= _WHOLE_SCANS * scan_s:
+        return None
+    name: Literal["end_of_scan", "start_of_scan"] = (
+        "end_of_scan" if before > after else "start_of_scan"
+    )
+    return StampFault(
+        name, {**parameters, "kind": "contradicted"}, None, None,
+        f"points were measured from {signed(points.first_s * 1e3, 4)} to "
+        f"{signed(points.last_s * 1e3, 4)} ms about the stamp, but a scan takes "
+        f"{to_digits(scan_s * 1e3, 4)} ms: at its start, its middle or its end, "
+        "none of its points lies farther off than that",
     )  # fmt: skip
 
 

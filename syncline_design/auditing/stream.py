@@ -39,6 +39,8 @@ LATE_OR_COARSE: Final = frozenset({"packetised", "truncated_stamps", "stamped_on
 _SAMPLE: Final = 100_000  # messages that tell a resolution
 _AT_EDGES: Final = 0.1  # of the messages that were overtaken
 _STRAY: Final = 0.01
+# what a stamp outside its scan follows from
+_OFF: Final = frozenset({"ahead_of_receipt", "epoch_offset", "whole_second_slip"})
 EDGE_S: Final = 1.5  # how near to the end of a shift a repeated stamp is its own
 TRACE_POINTS: Final = 240
 _UNEVEN: Final = 0.1  # of an interval
@@ -235,8 +237,9 @@ def _last(
     explained = names & {"whole_second_slip", "counter_wrap", "step", "relock"}
     fall = None if explained else order.remaining_falls(series)
     found += [fall] if fall is not None and "backward_jump" not in names else []
-    scan = arrival.scan(series, stream.points)
-    found += [scan] if scan is not None else []
+    scan = arrival.scan(series, stream.points, pace.period_s)
+    if scan is not None and not (scan.counts and {f.fault for f in found} & _OFF):
+        found.append(scan)
 
 
 def _blurs(arrived: StampFault, pace: Cadence) -> bool:

@@ -290,12 +290,12 @@ def _proposal(offers: Sequence[Offer], choice: LogChoice, poses: bool) -> Propos
         parts = parts_of(offers, choice)
     except BadInput as error:
         return Proposal(None, ProposedBlock(), "", (), (), (str(error),))
-    lacking, conversions = _tried(offers, choice, poses)
+    lacking, conversions, shows = _tried(offers, choice, poses)
     shown = _used(parts, poses)
     named = {role: part for role, part in shown.items() if role in _NAMED or part.sure == "stated"}
     block = ProposedBlock(
         {role: _name(part.offer, offers) for role, part in named.items()} if shown else None,
-        choice.timeline, choice.gps_week, *_axes(shown, choice),
+        choice.timeline, choice.gps_week, *_axes(shown, choice, shows),
     )  # fmt: skip
     return Proposal(
         kind=None if lacking else _kind(shown, poses),
@@ -315,15 +315,19 @@ _NAMED: Final = ("position", "attitude", "ranging", "target", "reference")
 
 def _tried(
     offers: Sequence[Offer], choice: LogChoice, poses: bool
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What keeps the mapping from working, else everything that it does to the values."""
+) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
+    """What keeps the mapping from working, else everything that it does to the values.
+
+    And whether places in WGS 84 showed axes that a file does not tell.
+    """
     try:
         lists = [o.path for o in offers if o.has("target") and o.stream.stamps is None]
         survey = first_survey([opened(path) for path in lists], choice.columns, ())
         sources = sources_of(offers, choice, "", poses, survey=survey)
     except BadInput as error:
-        return (str(error),), ()
-    return (), tuple(dict.fromkeys(note for one in sources for note in one.notes))
+        return (str(error),), (), False
+    notes = tuple(dict.fromkeys(note for one in sources for note in one.notes))
+    return (), notes, any(one.shown == "ned" for one in sources)
 
 
 def _used(parts: dict[Role, Part], poses: bool) -> dict[Role, Part]:
@@ -349,14 +353,20 @@ def _name(offer: Offer, offers: Sequence[Offer]) -> str:
 
 
 def _axes(
-    parts: dict[Role, Part], choice: LogChoice
+    parts: dict[Role, Part], choice: LogChoice, shows: bool
 ) -> tuple[Literal["enu", "ned"] | None, Literal["flu", "frd"] | None]:
-    """Frame and body as stated; where a stream in use does not tell, the assumed, to be seen."""
+    """Frame and body as stated; where a stream in use does not tell, the assumed, to be seen.
+
+    shows: places in WGS 84 showed one such stream to be north, east, down; beside another that
+    does not tell, the block has one word for both and says none: `diagnose` looks again.
+    """
     frame, body = choice.frame, choice.body
-    streams = [part.offer.stream for part in parts.values()]
+    streams = list({id(p.offer): p.offer.stream for p in parts.values()}.values())
     local = {"position_x_m", "quaternion_w", "velocity_x_mps"}
-    if any(s.frame == "unknown" and local & set(s.columns) for s in streams):
-        frame = frame or ASSUMED_FRAME
+    untold = [s for s in streams if s.frame == "unknown" and local & set(s.columns)]
+    if untold and frame is None:
+        seen: Literal["ned"] | None = "ned" if len(untold) == 1 else None
+        frame = seen if shows else ASSUMED_FRAME
     if any(s.body == "unknown" and "quaternion_w" in s.columns for s in streams):
         body = body or ASSUMED_BODY
     return frame, body

@@ -92,6 +92,7 @@ def _with_fitting_axes(one: StreamValues, globe: StreamValues, origin: Array) ->
     left = [_left(place[:, level] - places[:, level]) for places in (own, other)]
     if not np.isfinite(left).all() or left[1] > SWAPPED * left[0]:
         return
+    one.shown = "ned"
     one.put(POSITION, one.vectors(POSITION) @ ENU_TO_NED.T)
     if one.has(VELOCITY):
         one.put(VELOCITY, one.vectors(VELOCITY) @ ENU_TO_NED.T)

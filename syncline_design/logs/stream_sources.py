@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,11 +51,13 @@ class StreamSource:
     """One stream's columns, as a file of them."""
 
     def __init__(self, path: Path, name: str, time_ns: Nanoseconds, calendar: bool,
-                 columns: Mapping[str, Array], notes: Sequence[str]) -> None:  # fmt: skip
+                 columns: Mapping[str, Array], notes: Sequence[str],
+                 shown: Literal["ned"] | None = None) -> None:  # fmt: skip
         self.path = path.joinpath(name.strip("/").replace("/", "."))
         self.header = ("time_s", *columns)
         self.cut = 0
         self.notes = tuple(notes)
+        self.shown = shown  # axes that the file does not tell, as other places show them
         self._time_ns, self._calendar, self._columns = time_ns, calendar, columns
 
     def clock(self, name: str) -> Clock:
@@ -214,7 +216,8 @@ def _source(
         columns |= {n: one.columns[n] for n in names if n in one.columns}
     if "ranging" in roles and TARGET_ID in one.columns:
         columns[TARGET_ID] = one.columns[TARGET_ID]
-    return StreamSource(one.offer.path, one.offer.name, one.time_ns, calendar, columns, one.notes)
+    return StreamSource(one.offer.path, one.offer.name, one.time_ns, calendar, columns, one.notes,
+                        one.shown)  # fmt: skip
 
 
 _ROLE_COLUMNS: Final[Mapping[Role, tuple[str, ...]]] = {

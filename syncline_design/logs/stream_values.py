@@ -43,7 +43,7 @@ class StreamValues:
     """A stream's samples: stamps as in the file, canonical SI columns, and what was done to them.
 
     latitude_rad, longitude_rad, height_m stand as they are; everything else is local.  assumed:
-    axes that neither the log nor the spec tells.
+    axes that neither the log nor the spec tells.  shown: those that other places tell instead.
     """
 
     offer: Offer
@@ -52,6 +52,7 @@ class StreamValues:
     notes: list[str] = field(default_factory=list)
     origin: Array | None = None  # latitude, longitude [rad], height [m] of the local frame
     assumed: bool = False
+    shown: Literal["ned"] | None = None
 
     def has(self, names: Sequence[str]) -> bool:
         return all(name in self.columns for name in names)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -122,16 +123,19 @@ def _of_database(path: Path, wanted: frozenset[str] | None, brief: bool) -> Iter
         file.text_factory = _decoded
         file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_MESSAGE)
         file.set_progress_handler(_checked, STEPS)
+        if not _is_whole(path):  # else SQLite refuses a file shorter than its head says
+            file.execute("PRAGMA writable_schema = ON")
         channels, packed = _channels(file, path)
         budget = UnpackBudget(path, path.stat().st_size)
         only = [n for n, c in channels.items() if wanted is not None and c.topic in wanted]
-        rows = _rows(file, only, brief=brief and not packed and _is_whole(path))
-        for topic, stamp, data in rows:
-            channel = channels.get(topic)
-            if channel is None or not isinstance(stamp, int) or not isinstance(data, bytes):
-                raise DamagedError("a message of no known topic, or without a time")
-            whole = _plain(data, budget, path) if packed else data
-            yield RawMessage(channel, stamp, None, whole)
+        part = brief and not packed and _is_whole(path)
+        with closing(_rows(file, only, brief=part)) as rows:
+            for topic, stamp, data in rows:
+                channel = channels.get(topic)
+                if channel is None or not isinstance(stamp, int) or not isinstance(data, bytes):
+                    raise DamagedError("a message of no known topic, or without a time")
+                whole = _plain(data, budget, path) if packed else data
+                yield RawMessage(channel, stamp, None, whole)
     except sqlite3.Error as error:
         in_force().check()
         raise DamagedError(str(error)[:160]) from None
@@ -141,7 +145,7 @@ def _of_database(path: Path, wanted: frozenset[str] | None, brief: bool) -> Iter
 
 def _rows(
     file: sqlite3.Connection, only: Sequence[Any], *, brief: bool
-) -> Iterator[tuple[Any, Any, Any]]:
+) -> Generator[tuple[Any, Any, Any], None, None]:
     """(topic, time, data) of every message, or of some topics."""
     some = f"WHERE topic_id IN ({', '.join('?' * len(only))})" if only else ""
     if not brief:
