@@ -127,3 +127,32 @@ def test_waits_for_a_turn_that_a_trigger_makes_too_are_said_and_counted(tmp_path
     assert not found(row)
     assert hides(row, "sharp edge")
     assert row.residual_s.bound == pytest.approx(0.012, rel=0.1)
+
+
+@pytest.mark.parametrize(("rate", "scale", "out"), [(75.0, 6e-3, 228), (20.0, 6e-3, 31)])
+def test_arrivals_about_a_gap_are_late_by_no_more_than_they_were(
+    tmp_path: Path, rate: float, scale: float, out: int
+) -> None:
+    """A gap of whole intervals, over which counted intervals that scatter would go astray."""
+    rng = np.random.default_rng(37)
+    t = even(rate, 80.0)
+    stamp = np.maximum.accumulate(t + rng.gamma(2.0, scale, t.size))
+    receive = recorded(stamp, rng)
+    kept = np.ones(t.size, dtype=bool)
+    kept[t.size // 2 : t.size // 2 + out] = False
+    row = said(tmp_path, stamp[kept], receive[kept])
+    assert set(found(row)) == {"stamped_on_arrival", "gap"}
+    assert row.residual_s.bound == pytest.approx(np.ptp((receive - t)[kept]), rel=0.1)
+
+
+def test_lost_messages_of_a_drifting_clock_are_no_waits_for_a_turn(tmp_path: Path) -> None:
+    """What is missing lengthens no wait: nothing is counted in the bound beside transport."""
+    rng = np.random.default_rng(0)
+    t = 0.01 + np.arange(1471) / 15.0 + rng.normal(0.0, 2e-5, 1471)
+    delay = 0.03 + np.where(rng.random(t.size) < 0.97, rng.gamma(4.0, 6e-4, t.size),
+                            rng.gamma(2.0, 5e-3, t.size))  # fmt: skip
+    kept = rng.random(t.size) > 0.025
+    row = said(tmp_path, (t * (1 + 92e-6))[kept], np.maximum.accumulate(t + delay)[kept])
+    assert set(found(row)) == {"drift", "lost_messages"}
+    assert not hides(row, "wait")
+    assert row.residual_s.bound == pytest.approx(np.ptp(delay[kept]), rel=0.1)

@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.auditing.cadence import Cadence, about_rhythm
+from syncline_design.auditing.cadence import Cadence, about_rhythm, without_losses
 from syncline_design.auditing.frames import Framed, framed
 from syncline_design.auditing.late_scatter import Waits, waits_of
 from syncline_design.auditing.result import StampFault
@@ -113,7 +113,7 @@ def hidden_in(series: Series, pace: Cadence) -> Hidden | None:
     found = framed(when)
     if found is not None:
         return _hidden_frame(found, transport)
-    waits = waits_of(when)
+    waits = waits_of(without_losses(when, pace))
     if waits is None or not waits.edged:
         return None
     own, reach = spread(waits.about_s), waits.reach_s

@@ -28,6 +28,8 @@ _UNEVEN: Final = 0.03  # of an interval: from here on a late message may look li
 REGULAR: Final = 0.35  # of an interval: larger irregularities are no rhythm
 _PLACED: Final = 0.2  # of an interval: how near to its place a message after a loss is
 _LAG: Final = 16
+_EVEN: Final = 0.05  # of an interval: stamps whose every loss is sure
+_MOST_IN_GAPS: Final = 0.5  # of a log's time: more is how messages come
 _STRETCH: Final = 24  # messages over which a rhythm is followed
 _MOST_STRETCHES: Final = 5000
 _GROWTH: Final = 2.0  # of irregularity over 16 intervals against over one: a rhythm 1, a walk 4
@@ -89,6 +91,40 @@ def _walks(off: Array, usual: Mask, period: float) -> bool:
     total = np.concatenate([[0.0], np.cumsum(clean)])
     one, sixteen = scatter(clean), scatter(total[_LAG:] - total[:-_LAG])
     return sixteen > _WALK * one and sixteen > 0.05 * period
+
+
+def counted_over_gaps(when: Array) -> Array | None:
+    """The number of each message [intervals] of stamps that scatter, with what gaps left out.
+
+    Between gaps messages are counted one by one, as rounding intervals that scatter goes astray;
+    over a gap the earliest messages of either side tell how many are missing.  None without gaps.
+    """
+    interval = np.diff(when)
+    edges = np.flatnonzero(interval > LONG_GAP * float(np.median(interval))) + 1
+    edges = edges[np.diff(edges, append=when.size) >= _LAG]
+    edges = edges[np.diff(edges, prepend=0) >= _LAG]
+    if not edges.size or np.median(interval) <= 0.0:
+        return None
+    if float(interval[edges - 1].sum()) > _MOST_IN_GAPS * float(when[-1] - when[0]):
+        return None
+    longest = max(np.split(when, edges), key=lambda piece: piece.size)
+    period = float(np.polynomial.polynomial.polyfit(np.arange(longest.size), longest, 1)[1])
+    if period <= 0.0:
+        return None
+    counts = np.arange(when.size, dtype=np.float64)
+    floors = [float(piece.min()) for piece in np.split(when - period * counts, edges)]
+    missing_ = np.round((np.asarray(floors[1:]) - floors[0]) / period)
+    for edge, so_far in zip(edges, np.diff(missing_, prepend=0.0), strict=True):
+        counts[edge:] += so_far
+    return counts
+
+
+def without_losses(when: Array, pace: Cadence) -> Array:
+    """Stamps [s] of an even sensor as if none of its messages were missing."""
+    if not pace.regular or pace.jitter_s > _EVEN * pace.period_s:
+        return when
+    left_out = np.maximum(pace.steps - 1.0, 0.0) * pace.period_s
+    return np.asarray(when - np.concatenate([[0.0], np.cumsum(left_out)]))
 
 
 def about_rhythm(when: Array) -> Array | None:

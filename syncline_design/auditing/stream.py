@@ -10,7 +10,13 @@ import numpy as np
 
 from syncline_design.auditing import arrival, grains, order
 from syncline_design.auditing.blocks import Blocks
-from syncline_design.auditing.cadence import Cadence, cadence, level_scatter, missing
+from syncline_design.auditing.cadence import (
+    Cadence,
+    cadence,
+    counted_over_gaps,
+    level_scatter,
+    missing,
+)
 from syncline_design.auditing.clock_shapes import Shape
 from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.disorder import Disorder, disorder_of
@@ -344,7 +350,8 @@ def _rhythm(when: Array, pace: Cadence) -> Array | None:
     """When a regular sensor measured, from its own mean rhythm; None of an irregular one."""
     if when.size < 40 or when[-1] <= 0.0:
         return None
-    ways = [np.arange(when.size, dtype=np.float64)]
+    over = counted_over_gaps(when)
+    ways = [np.arange(when.size, dtype=np.float64) if over is None else over]
     if pace.regular:  # with losses counted
         ways.append(np.concatenate([[0.0], np.cumsum(pace.steps)]))
     for counts in ways:
