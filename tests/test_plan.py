@@ -381,6 +381,7 @@ def call(*words: object) -> Any:
         (["--separate", "latency(position)", "latency(position)"], "are one effect"),
         (["--separate", "latency", "lever_arm(position)"], "expected effect(sensor)"),
         (["--minutes", "0"], "expected more than 0 minutes"),
+        (["--minutes", "inf"], "--minutes inf: expected more than 0 minutes, finite"),
         (["--diagnosis", "SPEC"], "expected a diagnosis"),
     ],
     ids=lambda words: str(words)[:40],

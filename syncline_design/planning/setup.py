@@ -14,7 +14,6 @@ from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
 from syncline_design.planning.drives import WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
@@ -81,7 +80,7 @@ class Setup:
     def begun(cls, case: Case, request: PlanRequest) -> Setup:
         """Looks at every leg; PlanError where nothing can be planned for."""
         if not (0.0 < request.minutes < math.inf):
-            raise PlanError(f"--minutes {to_digits(request.minutes)}: expected more than 0 minutes")
+            raise PlanError(f"--minutes {request.minutes:g}: expected more than 0 minutes, finite")
         system = pinned_system(case)
         world = _world(case, system, request)
         asked = _asked(system, world.every, request)
