@@ -9,8 +9,21 @@ import tomllib
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import get_args
 
 import pytest
+
+from syncline_design.choice.outcome import FixKind
+from syncline_design.machine.sentences import or_rivals
+from syncline_design.report.sarif import _RULES
+from syncline_design.report.words import KINDS
+from syncline_design.spec.requirement import (
+    JUDGED_KINDS,
+    LIMIT_DIMENSIONS,
+    SUMMED_KINDS,
+    Requirement,
+)
+from syncline_design.verdict.tree import UNITS
 
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "syncline_design"
@@ -127,6 +140,30 @@ def test_the_words_of_the_glossary_are_names_in_the_code() -> None:
     named = set(re.findall(r"`([A-Z][a-z]\w+)`", page))
     assert len(named) > 25
     assert named - defined == set()
+
+
+def test_a_kind_of_requirement_is_known_wherever_the_page_sends_one() -> None:
+    """Every kind has its dimension, unit, words, rule and fix; which are sums is listed once."""
+    kinds = set(get_args(Requirement.model_fields["kind"].annotation))
+    assert set(LIMIT_DIMENSIONS) == kinds == set(SUMMED_KINDS) | set(JUDGED_KINDS)
+    for known in (KINDS, _RULES, get_args(FixKind), (*UNITS, "cost")):
+        assert kinds <= set(known)
+    assert {kind: UNITS[kind] for kind in sorted(kinds - {"cost"})} == {
+        "accuracy": "m", "mass": "kg", "monte_carlo": "m", "power": "W", "quantile": "m",
+        "rmse": "m", "sample_spacing": "m", "sync": "1", "thu": "m", "tvu": "m", "worst_case": "m",
+    }  # fmt: skip
+    listed = re.compile(r'"mass",\s*"power",\s*"sample_spacing",?\s*\)')
+    assert [p.name for p in PACKAGE.rglob("*.py") if listed.search(p.read_text("utf-8"))] == []
+
+
+@pytest.mark.parametrize(
+    "words", ["this log cannot tell)", "two outputs go to", "is a folder; give the name"]
+)
+def test_a_sentence_is_composed_in_one_place(words: str) -> None:
+    count = sum(path.read_text("utf-8").count(words) for path in PACKAGE.rglob("*.py"))
+    assert count == 1
+    assert or_rivals(["a", "b"]) == " (or a or b: this log cannot tell)"
+    assert or_rivals(()) == ""
 
 
 SAME_MEANING = {"Index"}  # places in an array, of either width

@@ -130,6 +130,19 @@ def test_what_a_first_drive_is_asked_for_acts_there() -> None:
     assert all(set(asked[name]) <= set(registry()[name].sensors) for name in asked)
 
 
+SUFFIXES = {"_mps2": "m/s^2", "_radps": "rad/s", "_mps": "m/s", "_rad": "rad", "_m": "m", "_s": "s"}
+WORDED = {"integer_second_slip.seconds"}  # a count, read without a unit
+
+
+@pytest.mark.parametrize("effect", registry().values(), ids=registry())
+def test_the_name_of_a_parameter_says_its_unit(effect: Effect) -> None:
+    """A spec's text is read by the name, a sentence printed by the unit: they must be one."""
+    for one in effect.parameters:
+        said = next((unit for end, unit in SUFFIXES.items() if one.name.endswith(end)), "")
+        if f"{effect.name}.{one.name}" not in WORDED and (said or one.unit in SUFFIXES.values()):
+            assert one.unit == said, one.name
+
+
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
 def test_sensitivity_is_the_slope_of_the_exact_term(effect: Effect, sensor: ActsOn) -> None:
     if effect.sensitivity is None:

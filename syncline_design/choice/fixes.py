@@ -25,16 +25,12 @@ from syncline_design.choice.written import in_unit_of, money, plain
 from syncline_design.model.figure_text import format_quantity, to_digits
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.case import Case, usable_primitives
-from syncline_design.spec.requirement import JUDGED_KINDS, LIMIT_DIMENSIONS, Requirement
+from syncline_design.spec.requirement import LIMIT_DIMENSIONS, LIMIT_UNITS, Requirement
 
 MOST_METHODS = 3
 TRIES = 6
 WIDENING = Fraction(1, 100)  # by which a simulated limit is widened when it does not hold yet
 IMPLIED = "SYNC"
-UNITS_OF = {
-    "accuracy": "m", "sync": "1", "mass": "kg", "power": "W",
-    "sample_spacing": "m", **dict.fromkeys(JUDGED_KINDS, "m")
-}  # fmt: skip
 
 
 Move = tuple[Requirement | None, float, Quantity]  # requirement (None: implied), before, after
@@ -146,7 +142,7 @@ def fix_of(case: Case, move: Move) -> Fix:
         return Fix("sync", None, None, None, before, float(after), "1", text)
     name, kind = requirement.id, requirement.kind
     written = getattr(requirement.limit, "text", to_digits(before, 6))
-    unit = UNITS_OF.get(kind, case.spec.currency)
+    unit = LIMIT_UNITS.get(kind, case.spec.currency)
     if kind != "cost":
         text = f"{name} from {written} to {after.text}"
         return Fix(kind, name, None, None, before, float(after), unit, text)

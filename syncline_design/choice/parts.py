@@ -17,8 +17,8 @@ from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import Limits, Objective, Problem, with_limits
 from syncline_design.machine.deadline import in_force
+from syncline_design.spec.requirement import SUMMED_KINDS
 
-KINDS = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
 FIELDS = {"accuracy": "accuracy_m", "sample_spacing": "spacing_m"}  # of Limits, else the kind
 SIMULATED = "monte_carlo"
 STEPS = 40
@@ -41,7 +41,9 @@ def parts_of(problem: Problem) -> tuple[ConflictPart, ...]:
     """Every requirement in force, the tightest of each kind of sum."""
     names = dict(problem.limits.ids)
     found = [
-        ConflictPart(kind, names.get(kind)) for kind in KINDS if _is_active(problem.limits, kind)
+        ConflictPart(kind, names.get(kind))
+        for kind in SUMMED_KINDS
+        if _is_active(problem.limits, kind)
     ]
     if problem.judge is not None:
         found += [ConflictPart(SIMULATED, name) for name, _ in problem.judge.limits]

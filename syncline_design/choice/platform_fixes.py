@@ -23,6 +23,7 @@ from syncline_design.choice.parts import CLOSE, is_feasible
 from syncline_design.choice.table import NOTHING, Limits, Pair, Problem, RoleTable, with_limits
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
+    PLATFORM_UNITS,
     Build,
     PlatformFigure,
     platform_figure,
@@ -41,7 +42,6 @@ MOST_RANGES = 400
 MOST_WINDOWS = 4  # that the sums leave and simulation is asked in
 SIMULATED_CLOSE = 1e-2  # where simulation decides
 MOST_DIGITS = 6
-UNITS_OF: dict[PlatformFigure, str] = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}
 Named = tuple[int, str, str, str]
 SHARES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.01, LEAST_SHARE)
 
@@ -65,7 +65,7 @@ def platform_fixes(case: Case, build: Build) -> Iterator[Fix]:
                         text = _of_several(stage.name, stage.distance, after)
                     yield Fix(
                         "platform", None, figure, stage.name, float(before), float(after),
-                        UNITS_OF[figure], text,
+                        PLATFORM_UNITS[figure], text,
                     )  # fmt: skip
 
 

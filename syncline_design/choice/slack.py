@@ -28,6 +28,7 @@ from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import NOTHING, Design, Problem
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
+    PLATFORM_UNITS,
     Build,
     PlatformFigure,
     platform_figure,
@@ -212,7 +213,7 @@ def _platform_slack(
         return (gone(other),)
 
     fails = first_failing(lambda at: not kinds_broken(at), tried(value, GROWTHS))
-    unit = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}[figure]
+    unit = PLATFORM_UNITS[figure]
     kind = None if fails is None else next(iter(kinds_broken(fails)), None)
     row = Slack(PLATFORM_FIGURES[figure][0], "", value, unit, fails, kind, None)
 

@@ -13,6 +13,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.roles import RoleName
+from syncline_design.model.unit_table import SI_UNITS
 from syncline_design.spec.case import IN_PLACE, Case, ends_of
 from syncline_design.spec.catalog import SensorEntry
 from syncline_design.spec.choices import MethodChoice
@@ -25,6 +26,7 @@ PLATFORM_FIGURES: dict[PlatformFigure, tuple[str, Dimension]] = {
     "distance": ("distance", Dimension.LENGTH),
     "omega_max": ("turn rate omega_max", Dimension.ANGULAR_RATE),
 }
+PLATFORM_UNITS = {figure: SI_UNITS[of] for figure, (_, of) in PLATFORM_FIGURES.items()}
 SIGMA_DIMENSIONS = {
     "sigma_position": Dimension.LENGTH,
     "sigma_attitude": Dimension.ANGLE,

@@ -25,6 +25,7 @@ from syncline_design.diagnosis.result import (
 )
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.sentences import or_rivals
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
 from syncline_design.model.normal import NORMAL_95
 
@@ -130,7 +131,7 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
         return unclear
     undone = list(log.parts.undone(one))
     if undone:
-        return Judgement("not_shown", f"not told apart on this log: {'; '.join(undone)}")
+        return _untold(undone)
     if own:
         return _immaterial(one, own, log.paper)
     return _nothing_found(one, log)
@@ -145,9 +146,11 @@ def _instead(log: LogEvidence, breaking: Sequence[Finding]) -> Judgement | None:
             return None
         told = " with ".join(f"{name} ({sensor})" for name, sensor, _ in others)
         words.append(f"{finding.sentence}, or {told} in its place")
-    return (
-        Judgement("not_shown", f"not told apart on this log: {'; '.join(words)}") if words else None
-    )
+    return _untold(words) if words else None
+
+
+def _untold(words: Sequence[str]) -> Judgement:
+    return Judgement("not_shown", f"not told apart on this log: {'; '.join(words)}")
 
 
 def _as_slow(within: Sequence[Finding]) -> str:
@@ -234,9 +237,7 @@ def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) ->
 
 
 def _said(finding: Finding) -> str:
-    others = [f"{a.effect} ({a.sensor})" for a in finding.aliases]
-    rivals = f" (or {' or '.join(others)}: this log cannot tell)" if others else ""
-    return finding.sentence + rivals
+    return finding.sentence + or_rivals(f"{a.effect} ({a.sensor})" for a in finding.aliases)
 
 
 def _immaterial(one: Assumed, own: Sequence[Finding], paper: OnPaper) -> Judgement:

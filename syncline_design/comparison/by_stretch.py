@@ -16,6 +16,7 @@ from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.sentences import or_rivals
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
 from syncline_design.model.normal import NEARLY_ALL, NORMAL_95
 
@@ -50,8 +51,7 @@ class InStretches:
             return None
         place = f"from {to_digits(s.from_s, 6)} s to {to_digits(s.to_s, 6)} s"
         if own and s.sure:
-            others = [f"{name} ({sensor})" for name, sensor, _ in s.others]
-            rivals = f" (or {', '.join(others)}: this log cannot tell)" if others else ""
+            rivals = or_rivals(f"{name} ({sensor})" for name, sensor, _ in s.others)
             words = f"{_amounts(s)} stands out {place}, and would turn the verdict{rivals}"
             return Judgement("broken", words, _figure(s, one), s.from_s, s.to_s)
         if s.sure:

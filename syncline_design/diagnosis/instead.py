@@ -38,8 +38,8 @@ class InItsPlace:
 
 
 @dataclass(frozen=True, slots=True)
-class Departures:
-    """Departures: label, which assumption each breaks, which columns it has; N and g of all."""
+class InQuestion:
+    """Departures asked together: label, which assumption each breaks, its columns; N, g of all."""
 
     labels: tuple[Label, ...]
     breaks: tuple[str, ...]
@@ -71,14 +71,14 @@ def in_place(data: Data, model: Model, found: Sequence[Signature]) -> tuple[InIt
     columns = tuple(
         tuple(at for at, owner in enumerate(joint.owner) if owner == k) for k in range(len(signed))
     )
-    asked = Departures(labels, tuple(s.candidate.effect.breaks for s in signed), columns,
+    asked = InQuestion(labels, tuple(s.candidate.effect.breaks for s in signed), columns,
                    joint.normal, joint.score)  # fmt: skip
     names = [stage.name for stage in data.view.system.stages]
     held = {labels.index(one.label) for one in own}
     return tuple(_each(asked, held, names))
 
 
-def _each(asked: Departures, held: Collection[int], names: Sequence[str]) -> Iterator[InItsPlace]:
+def _each(asked: InQuestion, held: Collection[int], names: Sequence[str]) -> Iterator[InItsPlace]:
     for k in sorted(held):
         others = others_in_place(asked, k, frozenset(held) - {k})
         if others is not None:
@@ -92,7 +92,7 @@ def _named(label: Label, names: Sequence[str]) -> Named:
 
 
 def others_in_place(
-    asked: Departures, own: int, kept: frozenset[int]
+    asked: InQuestion, own: int, kept: frozenset[int]
 ) -> tuple[frozenset[int], float] | None:
     """The fewest others that do in its place, and how much worse; None where none do together."""
     best: tuple[frozenset[int], float] | None = None
@@ -115,7 +115,7 @@ def others_in_place(
     return best
 
 
-def _allowed(asked: Departures, own: int, kept: frozenset[int]) -> Iterator[frozenset[int]]:
+def _allowed(asked: InQuestion, own: int, kept: frozenset[int]) -> Iterator[frozenset[int]]:
     """Sets of what could be in its place: no two delays more, nothing of its own kind that it
     moves no object with."""
     _, _, stage = asked.labels[own]

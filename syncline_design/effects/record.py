@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.sentences import one_of
 from syncline_design.model.figure_text import to_digits
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.roles import RoleName
@@ -221,7 +222,7 @@ class Misfit:
     @property
     def expected(self) -> str:
         """What it could say, in words."""
-        return f"one of {', '.join(self.known)}" if len(self.known) > 1 else self.known[0]
+        return one_of(self.known)
 
 
 Depart = Callable[[StageRows, Values, ActsOn, Rng], Departures]

@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 
 def sentence_list(items: list[str]) -> str:
     """`a`, `a and b`, `a, b and c`."""
     if len(items) < 2:
         return "".join(items)
     return ", ".join(items[:-1]) + " and " + items[-1]
+
+
+def one_of(known: Sequence[str]) -> str:
+    """What is expected where these are known: `one of a, b`, or the only one."""
+    return f"one of {', '.join(known)}" if len(known) > 1 else known[0]
+
+
+def or_rivals(names: Iterable[str]) -> str:
+    """What a log does not tell from what was just said; empty where there is none."""
+    listed = " or ".join(names)
+    return f" (or {listed}: this log cannot tell)" if listed else ""

@@ -94,14 +94,22 @@ def check_targets(targets: Sequence[OutputTarget], reads: Sequence[Path] = ()) -
         key = STDOUT if target.path == STDOUT else os.path.realpath(target.path)
         if key in seen:
             where = "standard output" if key == STDOUT else target.path
-            raise OutputError(f"two outputs go to {where}; give each its own path")
+            raise _twice(where)
         seen.add(key)
         _keep_from_charts(target, targets)
         if target.path.endswith("/"):
-            raise OutputError(f"{target.path}: is a folder; give the name of a file in it")
+            raise _a_folder(target.path)
         if target.path != STDOUT and not is_stream(target.path):
             _keep_inputs(target, key, inputs)
             check_writable(Path(target.path))
+
+
+def _twice(path: str) -> OutputError:
+    return OutputError(f"two outputs go to {path}; give each its own path")
+
+
+def _a_folder(path: str | Path) -> OutputError:
+    return OutputError(f"{path}: is a folder; give the name of a file in it")
 
 
 def _keep_from_charts(target: OutputTarget, targets: Sequence[OutputTarget]) -> None:
@@ -110,7 +118,7 @@ def _keep_from_charts(target: OutputTarget, targets: Sequence[OutputTarget]) -> 
     for other in targets:
         charts = other.format in CHART_FORMATS and path.suffix == f".{other.format}"
         if charts and target.path != STDOUT and path.parent == Path(os.path.realpath(other.path)):
-            raise OutputError(f"two outputs go to {target.path}; give each its own path")
+            raise _twice(target.path)
 
 
 def _check_folder(target: OutputTarget, inputs: set[str]) -> None:
@@ -138,7 +146,7 @@ def apart(path: Path, targets: Sequence[OutputTarget]) -> None:
     key = os.path.realpath(path)
     for target in targets:
         if target.path != STDOUT and os.path.realpath(target.path) == key:
-            raise OutputError(f"two outputs go to {target.path}; give each its own path")
+            raise _twice(target.path)
 
 
 def _keep_inputs(
@@ -162,7 +170,7 @@ def check_writable(path: Path) -> None:
         if error.errno == errno.ENAMETOOLONG:
             raise OutputError(f"{str(path)[:80]}...: the name is too long for a file") from None
     if path.is_dir():
-        raise OutputError(f"{path}: is a folder; give the name of a file in it")
+        raise _a_folder(path)
     if is_stream(path):
         return
     parent = Path(os.path.realpath(path)).parent

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from syncline_design.machine.sentences import one_of
 from syncline_design.model.figure_text import format_estimate
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.fields import did_you_mean
@@ -53,8 +54,7 @@ def _transponder_problem(
 def _problem(
     document: ParsedFile, path: KeyPath, message: str, found: str, known: tuple[str, ...]
 ) -> Flaw:
-    expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]
-    return problem_at(document, path, message, expected, found, did_you_mean(found, known))
+    return problem_at(document, path, message, one_of(known), found, did_you_mean(found, known))
 
 
 def describe(entry: EffectEntry) -> str:

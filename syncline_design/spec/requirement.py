@@ -13,6 +13,7 @@ from pydantic import field_validator as reads_field
 
 from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import Dimension, Quantity
+from syncline_design.model.unit_table import SI_UNITS
 from syncline_design.spec.fields import (
     FileRecord,
     NonEmptyText,
@@ -38,6 +39,9 @@ LIMIT_DIMENSIONS: dict[str, Dimension] = {
 }
 STATED_KINDS: Final = ("worst_case", "thu", "tvu", "rmse", "quantile")  # of the error's figures
 JUDGED_KINDS: Final = ("monte_carlo", *STATED_KINDS)  # decided design by design, not by sums
+SUMMED_KINDS: Final = tuple(kind for kind in LIMIT_DIMENSIONS if kind not in JUDGED_KINDS)
+# SI units of limits; an amount of money is in the currency of its spec.
+LIMIT_UNITS: Final = {kind: SI_UNITS[d] for kind, d in LIMIT_DIMENSIONS.items() if d in SI_UNITS}
 DEFAULT_CONFIDENCE: Final = 0.95
 ErrorAxis = Literal["horizontal", "vertical", "3d"]
 KEYS_OF: Final[dict[str, tuple[str, ...]]] = {  # keys of their own, those in capitals due

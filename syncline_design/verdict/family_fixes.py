@@ -16,11 +16,12 @@ from syncline_design.choice.explain import by_size
 from syncline_design.choice.fixes import fix_of, moves_to, with_moves
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Conflict, ConflictMember, Fix, NoVerdict, OutOfTime
-from syncline_design.choice.parts import FIELDS, KINDS, ConflictPart
+from syncline_design.choice.parts import FIELDS, ConflictPart
 from syncline_design.choice.table import Problem, with_limits
 from syncline_design.choice.variations import Build, with_stage
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, Mission
+from syncline_design.spec.requirement import SUMMED_KINDS
 from syncline_design.verdict.family import (
     ALL,
     Chosen,
@@ -51,7 +52,7 @@ def asked_of(work: Work) -> tuple[FamilyLimit, ...]:
     for one in work.scenarios:
         limits = one.problem.limits
         names = dict(limits.ids)
-        for kind in KINDS:
+        for kind in SUMMED_KINDS:
             if kind == "sample_spacing" or _limit(one.problem, kind) in (None, math.inf):
                 continue
             mission = None if kind in RESOURCES else one.mission

@@ -35,6 +35,7 @@ from syncline_design.choice.slack import (
 from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
+    PLATFORM_UNITS,
     Build,
     PlatformFigure,
     platform_figure,
@@ -46,7 +47,6 @@ from syncline_design.verdict.family import Chosen, Work, with_problems
 
 # Values at which a payload is chosen anew, over the term's own.
 FEW_GROWTHS = (1.0 + 1e-9, 1.01, 1.1, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0, 1e3, 1e4, 1e6)
-UNITS = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}
 
 Payload = tuple[tuple[tuple[str, str], ...], ...]
 
@@ -223,7 +223,7 @@ def _platform_row(ledger: Ledger, mission: int, stage: int, figure: PlatformFigu
     fails = first_failing(lambda at: not kinds_broken(at), tried(value, GROWTHS))
     kind = None if fails is None else next(iter(kinds_broken(fails)), None)
     row = Slack(
-        PLATFORM_FIGURES[figure][0], "", value, UNITS[figure], fails, kind, None,
+        PLATFORM_FIGURES[figure][0], "", value, PLATFORM_UNITS[figure], fails, kind, None,
         mission=ledger.name(mission),
     )  # fmt: skip
 

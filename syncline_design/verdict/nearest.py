@@ -8,7 +8,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from syncline_design.choice.evaluate import Evaluation, evaluate
-from syncline_design.choice.fixes import UNITS_OF, Move, with_moves
+from syncline_design.choice.fixes import Move, with_moves
 from syncline_design.choice.front import front
 from syncline_design.choice.holding import best_design
 from syncline_design.choice.outcome import Explanation, Fix, NoVerdict
@@ -17,10 +17,11 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import Build
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.case import Case
+from syncline_design.spec.requirement import LIMIT_DIMENSIONS
 from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.named import MissedLimit, Nearest, PricedError
 
-LIMITS = frozenset({*UNITS_OF, "cost"})  # kinds of fix that move a limit and nothing else
+LIMITS = frozenset(LIMIT_DIMENSIONS)  # kinds of fix that move a limit and nothing else
 ROOM = Fraction(1, 10**12)  # for a limit that was rounded to a float on its way
 
 

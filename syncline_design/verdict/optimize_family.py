@@ -18,6 +18,7 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.edit import pinned_spec_text
 from syncline_design.spec.edit_missions import pinned_missions_text
 from syncline_design.spec.load import BadInput, Flaw
+from syncline_design.spec.requirement import SUMMED_KINDS
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.family import MERGED, Chosen, Work, choose_family, front_of
 from syncline_design.verdict.family_choice import as_far
@@ -52,7 +53,6 @@ from syncline_design.verdict.tree import Caution, Verdict
 from syncline_design.verdict.why_not import Answer, questions_of
 
 Front = tuple[tuple[FrontDesign, ...], tuple[PriceStep, ...]]
-SUMS = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
 _HINGES = "what the design hinges on (slack, tolerances, what to measure next)"
 NOT_JUDGED = Caution("missions", f"{_HINGES} is worked out where every limit is one of sums")
 NOT_INTERVALS = Caution(
@@ -124,7 +124,7 @@ def _unhinged(case: Case, verdict: Verdict) -> Iterator[Caution]:
         return
     if case.spec.choose_for != "nominal":
         yield NOT_INTERVALS
-    elif any(one.kind not in SUMS for one in case.spec.requirements):
+    elif any(one.kind not in SUMMED_KINDS for one in case.spec.requirements):
         yield NOT_JUDGED
 
 

@@ -25,6 +25,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import NOTHING_KNOWN, Case, Known, RoleCase, StageCase
 from syncline_design.spec.catalog import SensorEntry
+from syncline_design.spec.requirement import SUMMED_KINDS
 from syncline_design.spec.selection import RoleSelection, Selection
 from syncline_design.verdict.recheck_facts import impossible, sample_spacing, underway
 from syncline_design.verdict.recheck_noise import bends, sigma_at
@@ -39,7 +40,6 @@ from syncline_design.verdict.recheck_sums import (
 DIGITS = 60
 IMPLIED_SYNC = "SYNC"
 IMPLIED_FACTS = "FACTS"  # fails where a chosen entry cannot work where it stands
-SUMMED = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
 Kind = Literal["accuracy", "sync", "cost", "mass", "power", "sample_spacing", "feasible"]
 
 
@@ -412,7 +412,7 @@ def _requirements(
     case: Case, found: Mapping[str, Fraction | None], silent: Sequence[str]
 ) -> Iterator[Rechecked]:
     """silent: sensors whose rate is not told."""
-    written = [one for one in case.spec.requirements if one.kind in SUMMED]
+    written = [one for one in case.spec.requirements if one.kind in SUMMED_KINDS]
     if not any(one.kind == "sync" for one in written):
         value = found["sync"]
         yield Rechecked(

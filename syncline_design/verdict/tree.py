@@ -17,7 +17,7 @@ from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.budget import SyncModelName
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
-from syncline_design.spec.requirement import JUDGED_KINDS
+from syncline_design.spec.requirement import LIMIT_UNITS
 from syncline_design.verdict.likely import Probability
 from syncline_design.verdict.named import (
     BillLine,
@@ -48,16 +48,7 @@ EXIT_CODES: Mapping[str, int] = {
     "refused": 2,
     "indeterminate": 3,
 }
-UNITS = {
-    "accuracy": "m",
-    **dict.fromkeys(JUDGED_KINDS, "m"),
-    "sync": "1",
-    "feasible": "1",
-    "failing_share": "1",
-    "sample_spacing": "m",
-    "mass": "kg",
-    "power": "W",
-}
+UNITS = {**LIMIT_UNITS, "feasible": "1", "failing_share": "1"}
 
 
 def finite(value: float | None) -> float | None:
