@@ -61,6 +61,19 @@ def sounding(vehicle: str, v: float, near: float, far: float) -> Stage:
     return Stage(vehicle, vehicle, platform, first, *roles[1:], arm)
 
 
+@pytest.mark.parametrize("arm", [(3.0, 4.0, 0.0), None], ids=["given", "any direction"])
+def test_a_long_arm_that_both_stamps_turn_alike_costs_nothing(arm: Any) -> None:
+    """Only the ranging stamp errs: antenna and attitude are turned by the same angle, which takes
+    the arm out; what is left is the chord of the sight alone."""
+    turn, d, late = 0.8, 5.0, 0.5
+    roles = [quiet("position", NO_ERROR), quiet("attitude", NO_ERROR)]
+    ranging = quiet("ranging", TimingError(Uniform(-late, late)))
+    position = replace(roles[0], lever_arm_m=arm)
+    stage = Stage("a", "a", Platform(0.0, turn, d, 40.0), position, roles[1], ranging)
+    exact = 2.0 * d * math.sin(0.5 * turn * late)
+    assert certified_worst_case_m(System((stage,), {}, horizon=LEVEL)) == pytest.approx(exact)
+
+
 @pytest.mark.parametrize(
     ("fixing", "own"),
     [((75.0, 75.0), (30.0, 30.0)), ((30.0, 30.0), (75.0, 75.0)), ((60.0, 60.0), (60.0, 60.0)),

@@ -30,7 +30,7 @@ from syncline_design.spec.load import load
 from syncline_design.verdict.explain_certificate import certificate
 from syncline_design.verdict.explain_figures import statistical
 from syncline_design.verdict.explain_shared import Worked
-from syncline_design.verdict.explain_sheet import worked_out
+from syncline_design.verdict.explain_sheet import between_rows, worked_out
 from syncline_design.verdict.named import ExplainedStep
 from syncline_design.verdict.pinned import picked_design
 from test_explain import MEETING, SPECS
@@ -284,3 +284,16 @@ def test_the_command_works_figures_out(tmp_path: Path) -> None:
 def test_a_line_is_arithmetic_or_nothing(numbers: str) -> None:
     with pytest.raises((ValueError, KeyError)):
         worked_out(numbers, {"x": 1.0})
+
+
+def test_a_table_of_noise_is_told_by_its_own_rows() -> None:
+    """Rows at 10 and 100 m, looked at from 60 m, where the stage's distances end: the line is that
+    of both rows, and what it gives is NumPy's interpolation."""
+    shape = ((10.0, 0.02 / 0.058), (40.0, 0.03 / 0.058), (60.0, 1.0), (100.0, 0.114 / 0.058))
+    for place in (5.0, 10.0, 20.0, 40.0, 55.0, 60.0, 90.0, 100.0, 120.0):
+        told = between_rows(shape, 0.058, place, "d")
+        expected = np.interp(place, (10.0, 40.0, 60.0, 100.0), (0.02, 0.03, 0.058, 0.114))
+        assert worked_out(told, {"d": place}) == pytest.approx(expected, rel=1e-9)
+    assert "0.114" in between_rows(shape, 0.058, 60.0, "d")
+    assert "0.058" not in between_rows(shape, 0.058, 60.0, "d")
+    assert between_rows((), 0.058, 60.0, "d") == ""

@@ -154,7 +154,8 @@ def _shapes(stage: StageCase, entry: SensorEntry) -> _Shapes:
     far = fraction_of(stage.platform.entry.distance)
     for name, table in entry.tables.items():
         if table.of == "range":
-            places = (*table.bends(Fraction(0), far), far)
+            beyond = [place for place, _ in table.rows if place > far][:1]  # for who explains it
+            places = (*table.bends(Fraction(0), far), far, *beyond)
             found = replace(found, by_range=_shares(table, places))
             continue
         beam = _shares(table, [place for place, _ in table.rows])

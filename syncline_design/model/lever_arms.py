@@ -36,3 +36,10 @@ def arm_difference(stage: Stage, first: bool) -> tuple[float, float, float] | No
         return None
     x, y, z = stage.ranging.lever_arm_m or (0.0, 0.0, 0.0)
     return x - given[0], y - given[1], z - given[2]
+
+
+def ranging_arm_m(stage: Stage) -> float:
+    """|l_L| [m]; 0 where it is not given or nothing ranges."""
+    if stage.ranging is None or stage.ranging.lever_arm_m is None:
+        return 0.0
+    return math.hypot(*stage.ranging.lever_arm_m)

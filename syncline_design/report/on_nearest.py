@@ -47,7 +47,7 @@ def nearest_nodes(
     cost = "a price that is not told" if found.cost is None else numbers.money(found.cost, currency)
     error = numbers.error(found.error_m, limit)
     missed = " and ".join(_missed(one) for one in found.misses)
-    text = f"{sensors}. It costs {cost} and errs by {error}; it misses {missed}."
+    text = f"{sensors}. It costs {cost}, its Syncline error is {error}; it misses {missed}."
     return [Heading("The nearest design"), Text(text), *_chart(found, currency, limit, price)]
 
 

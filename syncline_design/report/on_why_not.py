@@ -41,7 +41,7 @@ def _compared(one: HeldBack, currency: str) -> str:
     if best.cost is not None:
         cost = f"costs {numbers.money(best.cost, currency)}"
         cost += _more(one.dearer_by, numbers.money(abs(one.dearer_by or 0.0), currency))
-    error = f"errs by {numbers.length(best.error_m)}"
+    error = f"has a Syncline error of {numbers.length(best.error_m)}"
     error += _more(one.worse_by, numbers.length(abs(one.worse_by or 0.0)))
     return f"{cost} and {error}"
 

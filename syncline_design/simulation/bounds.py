@@ -15,10 +15,13 @@ from syncline_design.effects import acting as acting_effects
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import budget
 from syncline_design.model.known import Known
-from syncline_design.model.lever_arms import arm_difference, arm_lengths
+from syncline_design.model.lever_arms import arm_difference, arm_lengths, ranging_arm_m
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Look, Stage, System
+
+# Largest relative shifts [s] of position and attitude against ranging, and of both to each other.
+Shifts = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +67,7 @@ def chord(angle_rad: float) -> float:
 
 
 def stage_bound(
-    stage: Stage, first: bool, shifts_s: tuple[float, float], tilt_rad: float, added: Added
+    stage: Stage, first: bool, shifts_s: Shifts, tilt_rad: float, added: Added
 ) -> StageBound:
     """Largest |e| [m] of one stage for relative shifts up to (tau_p, tau_a) plus what effects add.
 
@@ -76,11 +79,16 @@ def stage_bound(
     most sigma_r, which bounds their distance by the law of cosines.  Under a bounded `look` a sight
     near the vertical swings by less, and what is turned as a whole, l_L - l_G + d n, may be shorter
     than the sum of both; the smaller of the two bounds holds.
+
+    What the antenna's arm is off by on its own is (R(s_p) - R') l_G, R' the measured attitude: it
+    hangs on how far the stamps of position and attitude are apart (tau_pa), whatever the ranging
+    sensor's.  Together with (R' - R) l_L and the sight that is a third bound, the smaller one where
+    long arms see the ranging sensor's stamp twice.
     """
     v, omega = float(stage.platform.v_max_mps), float(stage.platform.omega_max_radps)
     sigma_p = 0.0 if stage.position is None else math.hypot(*stage.position.sigma)
     antenna, difference = arm_lengths(stage, first)
-    position_s, attitude_s = shifts_s
+    position_s, attitude_s, between_s = shifts_s
     turn_p = omega * (position_s + added.position_s)
     position = v * (position_s + added.position_s) + sigma_p + added.offset_m
     arms = (chord(omega * position_s) + chord(omega * added.position_s)) * antenna
@@ -98,12 +106,17 @@ def stage_bound(
     lever = turn_p * antenna + (turn_a + sigma_a) * difference
     across = d * (turn_a + sigma_a + sigma_u)
     swing = omega * (attitude_s + added.attitude_s)
+    seen = _vector_distance(d, sigma_r, swung + sigma_u)
+    alone = chord(omega * between_s + off - omega * attitude_s) * antenna
+    alone += chord(omega * added.position_s) * antenna
     return StageBound(
         bound_m=position
-        + arms
         + min(
-            chord(off) * difference + _vector_distance(d, sigma_r, swung + sigma_u),
-            chord(off) * longest_lever_m(stage, first, d) + _vector_distance(d, sigma_r, sigma_u),
+            arms + chord(off) * difference + seen,
+            arms
+            + chord(off) * longest_lever_m(stage, first, d)
+            + _vector_distance(d, sigma_r, sigma_u),
+            alone + chord(off) * ranging_arm_m(stage) + seen,
         ),
         triangle_m=position + lever + across + sigma_r,
         lever_arm_m=lever,
@@ -170,13 +183,11 @@ def _vector_distance(length: float, longer_by: float, angle_rad: float) -> float
 
 def chain_bounds(system: System, tau_s: float) -> tuple[StageBound, ...]:
     """Each stage's bound with every pair's relative shift at most tau plus what effects add."""
-    return pairwise_bounds(system, tuple((tau_s, tau_s) for _ in system.stages))
+    return pairwise_bounds(system, tuple((tau_s, tau_s, 2.0 * tau_s) for _ in system.stages))
 
 
-def pairwise_bounds(
-    system: System, shifts_s: Sequence[tuple[float, float]]
-) -> tuple[StageBound, ...]:
-    """Each stage's bound at its largest shifts (of position, of attitude) plus what effects add."""
+def pairwise_bounds(system: System, shifts_s: Sequence[Shifts]) -> tuple[StageBound, ...]:
+    """Each stage's bound at its largest shifts plus what effects add."""
     known = acting_effects.known_of(system)
     tilt = system.horizon.tilt_rad
     return tuple(

@@ -6,7 +6,7 @@ import math
 
 from syncline_design.model import timing
 from syncline_design.model.system import UTC, Sensor, System
-from syncline_design.simulation.bounds import pairwise_bounds
+from syncline_design.simulation.bounds import Shifts, pairwise_bounds
 from syncline_design.simulation.settings import demand_simulable
 
 Span = tuple[float, float]
@@ -26,22 +26,24 @@ def certified_worst_case_m(system: System) -> float:
     return math.fsum(part.bound_m for part in parts)
 
 
-def largest_shifts_s(system: System) -> tuple[Span, ...]:
-    """Of each stage the largest |relative shift| [s] of its position and attitude pair.
+def largest_shifts_s(system: System) -> tuple[Shifts, ...]:
+    """Of each stage the largest |relative shift| [s] of its pairs, and of position to attitude.
 
     Position: the stage's own, from the second stage on the ranging sensor before it; both against
     the stage's ranging sensor.  Without one the position is held against true time.
     """
-    found: list[Span] = []
+    found: list[Shifts] = []
     before: Sensor | None = None
     for stage in system.stages:
         located = stage.position if before is None else before
-        position = attitude = 0.0
+        position = attitude = between = 0.0
         if located is not None:
             position = _largest_difference(system, located, stage.ranging)
         if stage.ranging is not None and stage.attitude is not None:
             attitude = _largest_difference(system, stage.attitude, stage.ranging)
-        found.append((position, attitude))
+            if located is not None:
+                between = _largest_difference(system, located, stage.attitude)
+        found.append((position, attitude, between))
         before = stage.ranging
     return tuple(found)
 

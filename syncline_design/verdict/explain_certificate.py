@@ -25,6 +25,7 @@ from syncline_design.simulation.figures import with_sensors_at
 from syncline_design.verdict.explain_shared import Worked, apart
 from syncline_design.verdict.explain_sheet import (
     Calculation,
+    between_rows,
     chord,
     number,
     root_of_squares,
@@ -98,7 +99,28 @@ def _stage(at: _At) -> str:
     if stage.ranging is None or stage.attitude is None:
         return at.line("bound", "moved + antenna", f"{moved} + {turned}")
     seen = _seen(at, w)
-    return at.line("bound", "moved + antenna + sight", f"{moved} + {turned} + {seen}")
+    alone, beside = _apart(at, w, arm, added)
+    return at.line("bound", "moved + the smaller of antenna + sight, alone + sight_3",
+                   f"{moved} + min({turned} + {seen}, {alone} + {beside})")  # fmt: skip
+
+
+def _apart(at: _At, w: str, arm: str, added: str) -> tuple[str, str]:
+    """The antenna's arm on its own, turned by how far position and attitude are apart; the rest."""
+    assert at.stage.ranging is not None
+    name = at.suffix
+    between = _shift(at, "position", at.stage.attitude)
+    turn = f"{w} * ({between} - shift_attitude_{name}) + a_{name}"
+    alone = at.line(
+        "alone", "chord(omega (shift_between - shift_attitude) + a) |l_G| + chord(omega added) "
+        "|l_G|: the ranging sensor's stamp does not matter to it",
+        f"({chord(turn)} + {chord(f'{w} * {added}')}) * {arm}",
+    )  # fmt: skip
+    other = at.stage.ranging.lever_arm_m or (0.0, 0.0, 0.0)
+    beside = at.line(
+        "sight_3", "chord(a) |l_L| + the root of sight_1",
+        f"{chord(f'a_{name}')} * {root_of_squares(other)} + cosines_{name}",
+    )  # fmt: skip
+    return alone, beside
 
 
 def _antenna(at: _At) -> str:
@@ -121,10 +143,10 @@ def _seen(at: _At, w: str) -> str:
                       lambda what: what.turn_rad, "rad", only=_scatters)  # fmt: skip
     sigma_a = at.line("sigma_Theta", "k |(s_roll, s_pitch, s_yaw)| + effects", total(euler), "rad",
                       worked.of(stage.attitude))  # fmt: skip
-    r, *angles = stage.ranging.sigma
+    angles = stage.ranging.sigma[1:]
     source = worked.of(stage.ranging)
-    sigma_r = at.line("sigma_r", f"k s_range{_hangs_on(stage.ranging)}", f"k * {number(r)}", "m",
-                      source)  # fmt: skip
+    sigma_r = at.line("sigma_r", f"k s_range{_hangs_on(stage.ranging)}",
+                      f"k * {_at_d(stage.ranging, d, at)}", "m", source)  # fmt: skip
     sight = [f"k * {root_of_squares(angles)}"]
     sight += _effects(at, "bent", "what known effects turn the line of sight by at most",
                       lambda what: what.sight_rad, "rad")  # fmt: skip
@@ -135,6 +157,12 @@ def _seen(at: _At, w: str) -> str:
                      lambda what: what.turn_rad, "rad", only=_turns)  # fmt: skip
     turned = at.line("turn", "omega (shift + added) + effects", total(turn), "rad")
     return _swing(at, d, (turned, sigma_a, sigma_u, sigma_r))
+
+
+def _at_d(ranging: Sensor, d: str, at: _At) -> str:
+    """s_range at d: between two rows of its table, if it has one."""
+    sigma = float(ranging.sigma[0])
+    return between_rows(ranging.range_shape, sigma, at.sheet.known[d], d) or number(sigma)
 
 
 def _hangs_on(ranging: Sensor) -> str:
@@ -157,11 +185,12 @@ def _swing(at: _At, d: str, errors: tuple[str, str, str, str]) -> str:
                     f"{turned} + {sigma_a} * {_growth(at, grown, leans)}", "rad")  # fmt: skip
     lever = _difference(at)
     cosines = "sqrt({r}**2 + {d} * ({d} + {r}) * ({swing})**2)"
-    apart_ = at.line(
-        "sight_1", "chord(a) |l_L - l_G| + law of cosines by a_sight + sigma_u",
-        f"{chord(off)} * {lever} + "
-        + cosines.format(r=sigma_r, d=d, swing=chord(f"({swung} + {sigma_u})")),
+    sight = at.line(
+        "cosines", "law of cosines by a_sight + sigma_u, range longer by sigma_r",
+        cosines.format(r=sigma_r, d=d, swing=chord(f"({swung} + {sigma_u})")),
     )  # fmt: skip
+    apart_ = at.line("sight_1", "chord(a) |l_L - l_G| + law of cosines by a_sight + sigma_u",
+                     f"{chord(off)} * {lever} + {sight}")  # fmt: skip
     whole = at.line(
         "sight_2", "chord(a) largest |l_L - l_G + d n| + law of cosines by sigma_u",
         f"{chord(off)} * {_longest(at, d, lever)} + "
@@ -214,17 +243,18 @@ def _longest(at: _At, d: str, lever: str) -> str:
                    f"sqrt(max({lever}**2 + {d}**2 + 2 * {d} * {name}, 0.0))")  # fmt: skip
 
 
-def _shift(at: _At, role: RoleName) -> str:
-    """Largest |m_i - m_ref|, end against end."""
-    stage, reference = at.stage, at.stage.ranging
+def _shift(at: _At, role: RoleName, against: Sensor | None = None) -> str:
+    """Largest |m_i - m_ref|, end against end; the reference is the ranging sensor if not given."""
+    stage, reference = at.stage, against or at.stage.ranging
     owner: tuple[Stage, Sensor | None, str] = (stage, getattr(stage, role), at.suffix)
     if role == "position" and at.before is not None:
         owner = (at.before, at.before.ranging, suffixes(at.system)[at.index - 1])
     name, formula = f"shift_{role}", "largest difference of both stamps, end against end"
+    if against is not None:
+        name, formula = "shift_between", f"the same of {role} and attitude"
     if owner[1] is None:
         return at.line(name, "no such sensor", "0.0", "s")
-    against = UTC if reference is None else reference.timeline
-    offsets = owner[1].timeline != against
+    offsets = owner[1].timeline != (UTC if reference is None else reference.timeline)
     low, high = _span(at, owner[1], owner[0], owner[2], offsets)
     if reference is None:
         formula = "largest error of the stamp against true time"

@@ -7,6 +7,7 @@ own text, whose names are earlier lines.
 from __future__ import annotations
 
 import ast
+import itertools
 import math
 import operator
 import re
@@ -15,7 +16,7 @@ from dataclasses import field
 from typing import Any
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.system import System
+from syncline_design.model.system import ShareCurve, System
 from syncline_design.verdict.named import ExplainedStep
 
 PI = repr(math.pi)
@@ -50,6 +51,35 @@ def total(terms: Iterable[str]) -> str:
     """A sum in writing, `a + b - c`, 0.0 of nothing."""
     text = " + ".join(terms).replace("+ -", "- ")
     return text or "0.0"
+
+
+def between_rows(shape: ShareCurve, sigma: float, place: float, name: str) -> str:
+    """A table's deviation at a place, from the rows it lies between; outside, from the outermost.
+
+    name: what stands for the place in the line.  The rows are shares of sigma; those on the line
+    of both their neighbours (where a distance ends) are none of the table's.
+    """
+    rows = [(at, float(f"{sigma * share:.12g}")) for at, share in _corners(shape)]
+    if not rows:
+        return ""
+    if not rows[0][0] < place < rows[-1][0]:
+        return number(rows[0][1] if place <= rows[0][0] else rows[-1][1])
+    (start, low), (end, high) = next(
+        pair for pair in itertools.pairwise(rows) if pair[0][0] <= place <= pair[1][0]
+    )
+    rise, width = f"({number(high)} - {number(low)})", f"({number(end)} - {number(start)})"
+    return f"({number(low)} + {rise} * ({name} - {number(start)}) / {width})"
+
+
+def _corners(shape: ShareCurve) -> list[tuple[float, float]]:
+    found: list[tuple[float, float]] = []
+    for row, after in itertools.zip_longest(shape, shape[1:]):
+        if found and after is not None:
+            (x0, y0), (x1, y1), (x2, y2) = found[-1], row, after
+            if math.isclose((y1 - y0) * (x2 - x0), (y2 - y0) * (x1 - x0), rel_tol=1e-9):
+                continue
+        found.append(row)
+    return found
 
 
 def suffixes(system: System) -> tuple[str, ...]:

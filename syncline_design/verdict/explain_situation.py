@@ -9,6 +9,7 @@ R = Rz(yaw) Ry(pitch) Rx(roll), the lever q = l_L - l_G + d n and the axes of ro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import field
 
@@ -30,7 +31,13 @@ from syncline_design.simulation.draws import entering
 from syncline_design.simulation.figures import StageSituation
 from syncline_design.simulation.timing_variables import TimingVariable
 from syncline_design.verdict.explain_shared import Worked, apart
-from syncline_design.verdict.explain_sheet import Calculation, number, suffixes, total
+from syncline_design.verdict.explain_sheet import (
+    Calculation,
+    between_rows,
+    number,
+    suffixes,
+    total,
+)
 
 AxisLines = tuple[str, str, str]  # lines or terms, north, east, down (or x, y, z of the body)
 NOTHING: AxisLines = ("", "", "")
@@ -217,7 +224,10 @@ class _At:
         if not value:
             return ""
         numbers, formula = number(value), f"one standard deviation of {sensor.role}, {what}"
-        if share != 1.0:
+        rows = self._of_table(sensor, place, value)
+        if rows:
+            numbers, formula = rows, f"{formula}, between two rows of its table"
+        elif share != 1.0:
             numbers, formula = f"{numbers} * {number(share)}", f"{formula}, here"
         times = self.found.growth.get((self.index, sensor.role))
         if times is not None:
@@ -225,6 +235,21 @@ class _At:
             formula += " x what known effects make of it"
         unit = _UNITS.get(sensor.role, "rad" if place else "m")
         return self.line(f"s_{what}", formula, numbers, unit, self.worked.of(sensor))
+
+    def _of_table(self, sensor: Sensor, place: int, sigma: float) -> str:
+        """A deviation from the rows of its table, by range or by the beam's angle; "" without."""
+        if sensor.role != "ranging":
+            return ""
+        if place == 0 and sensor.range_shape:
+            d = self.name("d")
+            return between_rows(sensor.range_shape, sigma, self.sheet.known[d], d)
+        shape = sensor.bearing_by_beam if place else sensor.range_by_beam
+        if not shape:
+            return ""
+        down = min(max(self.sheet.known[self.lines["n"][2]], -1.0), 1.0)
+        beam = self.line("beam", "of n from straight down: its cosine is look_z",
+                         number(math.acos(down)), "rad")  # fmt: skip
+        return between_rows(shape, sigma, self.sheet.known[beam], beam)
 
     def _position(self, sensor: Sensor) -> Iterator[AxisLines]:
         for place, axis in enumerate(_NED):

@@ -8,7 +8,8 @@ x chord(A) / A.  A root of squares is at least its tangent, (x x0 + y y0) / |(x0
 largest shift is at least the sum of both half widths.  What remains is linear in what each role
 adds, so that a search can leave out whole branches by it.  Known effects only ever add.  Where a
 look bounds l' = |l_L - l_G + d n| below d + l the certificate is the smaller of two bounds; of both
-lower ones the smaller slope of each magnitude is taken.
+lower ones the smaller slope of each magnitude is taken.  A third bound has |l_L| in place of l, the
+smaller of both counts.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from syncline_design.choice.options import Floats
 from syncline_design.choice.table import Cut, Design, Problem, RoleTable
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model import timing
-from syncline_design.model.lever_arms import arm_lengths
+from syncline_design.model.lever_arms import arm_lengths, ranging_arm_m
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation.bounds import chord, longest_lever_m
@@ -157,7 +158,7 @@ def _slopes(case: Case, asked: Problem, system: System, index: int, at: Stated) 
     secant = chord(widest) / widest if widest > 0.0 else 1.0
     x, y = k * stage.ranging.sigma[0], d * secant * _angle(stage, k)
     length = math.hypot(x, y) or 1.0
-    _, arm = arm_lengths(stage, index == 0)
+    arm = min(arm_lengths(stage, index == 0)[1], ranging_arm_m(stage))  # of two of the bounds
     across, turned = y / length * d * secant, arm * secant
     whole = longest_lever_m(stage, index == 0, d) * secant
     if whole >= d * secant + turned:  # the other bound is never the smaller one
