@@ -21,7 +21,7 @@ from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Look, Stage, System
 
 # Largest relative shifts [s] of position and attitude against ranging, and of both to each other.
-Shifts = tuple[float, float, float]
+StageShifts = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def chord(angle_rad: float) -> float:
 
 
 def stage_bound(
-    stage: Stage, first: bool, shifts_s: Shifts, tilt_rad: float, added: Added
+    stage: Stage, first: bool, shifts_s: StageShifts, tilt_rad: float, added: Added
 ) -> StageBound:
     """Largest |e| [m] of one stage for relative shifts up to (tau_p, tau_a) plus what effects add.
 
@@ -186,7 +186,7 @@ def chain_bounds(system: System, tau_s: float) -> tuple[StageBound, ...]:
     return pairwise_bounds(system, tuple((tau_s, tau_s, 2.0 * tau_s) for _ in system.stages))
 
 
-def pairwise_bounds(system: System, shifts_s: Sequence[Shifts]) -> tuple[StageBound, ...]:
+def pairwise_bounds(system: System, shifts_s: Sequence[StageShifts]) -> tuple[StageBound, ...]:
     """Each stage's bound at its largest shifts plus what effects add."""
     known = acting_effects.known_of(system)
     tilt = system.horizon.tilt_rad

@@ -6,7 +6,7 @@ import math
 
 from syncline_design.model import timing
 from syncline_design.model.system import UTC, Sensor, System
-from syncline_design.simulation.bounds import Shifts, pairwise_bounds
+from syncline_design.simulation.bounds import StageShifts, pairwise_bounds
 from syncline_design.simulation.settings import demand_simulable
 
 Span = tuple[float, float]
@@ -26,13 +26,13 @@ def certified_worst_case_m(system: System) -> float:
     return math.fsum(part.bound_m for part in parts)
 
 
-def largest_shifts_s(system: System) -> tuple[Shifts, ...]:
+def largest_shifts_s(system: System) -> tuple[StageShifts, ...]:
     """Of each stage the largest |relative shift| [s] of its pairs, and of position to attitude.
 
     Position: the stage's own, from the second stage on the ranging sensor before it; both against
     the stage's ranging sensor.  Without one the position is held against true time.
     """
-    found: list[Shifts] = []
+    found: list[StageShifts] = []
     before: Sensor | None = None
     for stage in system.stages:
         located = stage.position if before is None else before
