@@ -82,3 +82,31 @@ def test_tails_that_are_listed_are_not_told_again(tmp_path: Path) -> None:
     assert "heavy_tails" not in [c.effect.name for c in candidates(seen(folder))]
     found = diagnose(folder / "spec.yaml", [folder / "log.csv"], DiagnosisSettings(max_effects=1))
     assert found.verdict == "agrees"
+
+
+def test_one_axis_that_wanders_alone_is_named(tmp_path: Path) -> None:
+    """A first-order Gauss-Markov course, drawn here, on the logged east positions alone."""
+    folder = told(tmp_path)
+    names, *rows = (folder / "log.csv").read_text(encoding="utf-8").splitlines()
+    table = np.array([row.split(",") for row in rows], dtype=object)
+    time, east = (names.split(",").index(name) for name in ("time_s", "position_east_m"))
+    decay = np.exp(-np.diff(table[:, time].astype(float)) / 12.0)
+    draws = np.random.default_rng(4).standard_normal(len(rows))
+    course = [draws[0]]
+    for share, draw in zip(decay, draws[1:], strict=True):
+        course.append(share * course[-1] + np.sqrt(1.0 - share**2) * draw)
+    stage = seen(folder).system.stages[0]
+    assert stage.position is not None
+    size = 2.5 * stage.position.sigma[1] * np.array(course)
+    table[:, east] = table[:, east].astype(float) + size
+    lines = [names, *(",".join(map(str, row)) for row in table)]
+    (folder / "log.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = diagnose(folder / "spec.yaml", [folder / "log.csv"], DiagnosisSettings(max_effects=1))
+    (finding,) = found.findings
+    assert (finding.effect, finding.sensor, finding.kind) == (
+        "correlated_noise",
+        "position",
+        "noise",
+    )
+    spread = np.sqrt(3.0) * finding.parameters["std_m"].value  # of all three axes together
+    assert spread == pytest.approx(np.sqrt(np.mean(size**2)), rel=0.35)

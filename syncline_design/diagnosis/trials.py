@@ -221,7 +221,9 @@ def _put_in(data: Data, candidate: Candidate, model: Model) -> list[tuple[Opened
         case "factor":
             levels = [_times_factor(data, level, sensor, k) for k in (1.15, 2.0)]
         case "slow" | "down":
-            levels = [_times_slow(data, level, sensor, what, k) for k in (1.5, 6.0)]
+            # One axis may wander alone: more on the others as well would then look worse.
+            axes = ((2,),) if what == "down" else ((0, 1, 2), (0,), (1,), (2,))
+            levels = [_times_slow(data, level, sensor, on, k) for on in axes for k in (1.5, 6.0)]
         case "size":
             index = directed_index(data, candidate)
             unit = usual_noise_size(data, index)
@@ -238,11 +240,11 @@ def _times_factor(data: Data, level: NoiseLevel, sensor: tuple[str, str], by: fl
 
 
 def _times_slow(
-    data: Data, level: NoiseLevel, sensor: tuple[str, str], what: str, by: float
+    data: Data, level: NoiseLevel, sensor: tuple[str, str], axes: tuple[int, ...], by: float
 ) -> NoiseLevel:
     slow = tuple(
         tuple(
-            max(v, 0.5) * by if part.sensor == sensor and (what == "slow" or k == 2) else v
+            max(v, 0.5) * by if part.sensor == sensor and k in axes else v
             for k, v in enumerate(values)
         )
         for part, values in zip(data.structure.slow, level.slow, strict=True)
