@@ -6,7 +6,8 @@ t_c the variance over the spec's of what c scatters, the likelihood
     L(t) = -sum_i (log |S_i| + e_i' S_i^-1 e_i) / 2
 is compared: t_c of one sensor free, or of some of its readings, all others at most the spec's.
 What gains most is taken, again until nothing gains; the readings of a sensor are unlike where they
-beat every sensor as a whole in most of the log's blocks.
+beat every sensor as a whole in most of the log's blocks.  What scatters along the motion, as jitter
+of stamps does, is free throughout: it is no noise of the readings that lie along it.
 Source: Searle, Casella, McCulloch, Variance Components (1992), ch. 6.
 """
 
@@ -72,15 +73,18 @@ class LoudSensor:
 
 
 def loud_readings(
-    error: Array, slopes: dict[SensorKey, Array], fixed: Array
+    error: Array, slopes: dict[SensorKey, Array], fixed: Array, motions: Sequence[Array] = ()
 ) -> tuple[LoudSensor, ...]:
     """Sensors of which some readings alone are too loud.
 
     error (n, a) [m]; slopes (n, a, k) a sensor: what one standard deviation of a reading does;
-    fixed (n, a, a) [m2]: what else scatters.
+    fixed (n, a, a) [m2]: what else scatters; motions (n, a, 1): along what stamps would scatter,
+    in any unit.
     """
     thin = slice(None, None, 1 + (len(error) - 1) // MOST_ROWS)
     parts = tuple(_part(sensor, range(own.shape[2]), own[thin]) for sensor, own in slopes.items())
+    size = np.sqrt(np.mean([np.trace(np.mean(one.squares, axis=0)) for one in parts]))
+    parts += tuple(_along(place, own[thin], size) for place, own in enumerate(motions))
     now, loud = fitted(error[thin], parts, fixed[thin]), dict[SensorKey, float]()
     for _ in range(MOST_ROUNDS):
         wholes = [fitted(error[thin], one, fixed[thin], now) for one in _wholes(now.parts)]
@@ -112,6 +116,13 @@ def _part(
 ) -> ReadingsNoise:
     own = slopes[:, :, list(readings)]
     return ReadingsNoise(sensor, tuple(readings), own @ np.swapaxes(own, 1, 2), is_open)
+
+
+def _along(place: int, motion: Array, size: float) -> ReadingsNoise:
+    """Scatter along a motion, of any size: one unit of it as large as a sensor's noise."""
+    scale = size / max(float(np.sqrt(np.mean(np.sum(motion**2, axis=1)))), np.finfo(float).tiny)
+    own = scale * motion
+    return ReadingsNoise(("", f"motion {place}"), (0,), own @ np.swapaxes(own, 1, 2), is_open=True)
 
 
 def _wholes(parts: Sequence[ReadingsNoise]) -> Iterator[tuple[ReadingsNoise, ...]]:

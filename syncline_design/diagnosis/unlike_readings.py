@@ -87,7 +87,8 @@ def unlike_readings(data: Data, model: Model) -> tuple[Unlike, ...]:
     if data.structure.stamped is not None:
         fixed = fixed + data.structure.stamped @ np.swapaxes(data.structure.stamped, 1, 2)
     on_axes = {sensor: own[:, axes] for sensor, own in slopes.items()}
-    loud = loud_readings(left, on_axes, fixed[:, axes][:, :, axes])
+    motions = [one.direction[:, axes] for one in data.structure.directed]
+    loud = loud_readings(left, on_axes, fixed[:, axes][:, :, axes], motions)
     return tuple(
         _unlike(one) for one in loud if not _is_steady(left, on_axes[one.sensor], one.times)
     )

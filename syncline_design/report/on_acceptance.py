@@ -120,7 +120,7 @@ def _table(result: Acceptance) -> Table:
             Cell(row.evidence),
         ))  # fmt: skip
     heads = (
-        "AssumptionStatus",
+        "Status",
         "Where",
         "Assumption",
         "Assumed #",
