@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.candidates import Candidate, Signature
-from syncline_design.diagnosis.instead import Departures, others_in_place
+from syncline_design.diagnosis.instead import InQuestion, others_in_place
 from syncline_design.diagnosis.noise import as_specified
 from syncline_design.diagnosis.pairs import promising
 from syncline_design.diagnosis.scores import Gram, gram
@@ -73,7 +73,7 @@ def test_a_pair_that_does_as_well_is_said_in_the_place_of_a_delay(
         ("latency", "attitude", 0), ("latency", "ranging", 0), ("lever_arm", "ranging", 0),
         ("latency", "position", 0),
     )  # fmt: skip
-    asked = Departures(
+    asked = InQuestion(
         labels, ("latency", "latency", "lever_arm", "latency"), ((0,), (1,), (2,), (3,)),
         columns.T @ columns, columns.T @ error,
     )  # fmt: skip

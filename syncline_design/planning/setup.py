@@ -80,7 +80,7 @@ class Setup:
     def begun(cls, case: Case, request: PlanRequest) -> Setup:
         """Looks at every leg; PlanError where nothing can be planned for."""
         if not (0.0 < request.minutes < math.inf):
-            raise PlanError(f"--minutes {request.minutes:g}: expected more than 0 minutes, finite")
+            raise PlanError(f"--minutes {request.minutes}: expected more than 0 minutes, finite")
         system = pinned_system(case)
         world = _world(case, system, request)
         asked = _asked(system, world.every, request)

@@ -16,6 +16,7 @@ from dataclasses import field
 from typing import Any
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import rounded
 from syncline_design.model.system import ShareCurve, System
 from syncline_design.verdict.named import ExplainedStep
 
@@ -59,7 +60,7 @@ def between_rows(shape: ShareCurve, sigma: float, place: float, name: str) -> st
     name: what stands for the place in the line.  The rows are shares of sigma; those on the line
     of both their neighbours (where a distance ends) are none of the table's.
     """
-    rows = [(at, float(f"{sigma * share:.12g}")) for at, share in _corners(shape)]
+    rows = [(at, rounded(sigma * share, 12)) for at, share in _corners(shape)]
     if not rows:
         return ""
     if not rows[0][0] < place < rows[-1][0]:
