@@ -5,7 +5,8 @@ BIN := $(VENV)/bin
 RUN := $(VENV)/.installed
 DEV := $(VENV)/.installed-dev
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-JOBS ?= 2
+# One more than two cores: some tests wait for clocks and processes.
+JOBS ?= 3
 
 .PHONY: demo test lint bench study docs clean
 
