@@ -99,23 +99,22 @@ def verdict_on(
     choice: ChoiceResult,
 ) -> Verdict:
     """The whole verdict on a verified design."""
+    decided = _decided(case, problem, verified, settings, choice)
     if settings.brief:
-        return _decided(case, problem, verified, settings, choice)
+        return decided
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
     figures = error_figures(verified, settings.seed, settings.monte_carlo)
     told = sources(entries)
     bill = bill_of_materials(case, problem, verified.design)
-    shown = named_design(case, problem, verified.design, verified.figures)
+    assert decided.design is not None
     by_id = {one.id: one for one in case.spec.requirements}
-    worked = Worked(verified.system, case.spec.sync_model, shown, told, by_id, settings.seed)
+    worked = Worked(
+        verified.system, case.spec.sync_model, decided.design, told, by_id, settings.seed
+    )
     asked = [row for row in verified.requirements if row.id in settings.explain]
     return replace(
-        framed(verified.word, case, problem, settings.seed),
-        requirements=verified.requirements,
-        design=shown,
-        syncline=syncline_figures(verified, case.spec.sync_model),
-        monte_carlo=verified.monte_carlo,
+        decided,
         warnings=(
             *cautions(case, verified, figures, assumed, transcripts(entries)),
             *claim_cautions(case, entries),
@@ -125,7 +124,6 @@ def verdict_on(
         assumptions=assumed,
         sources=told,
         effects=known_effects(verified.system),
-        choice=choice or None,
         measured=measured(case, entries),
         explained=explained(worked, asked) if asked else None,
         bill_of_materials=bill,
