@@ -241,7 +241,7 @@ def test_the_command_refuses_with_exit_2_and_writes_nothing(
         process = subprocess.Popen(
             started, stdout=out, stderr=err, cwd=corpus, start_new_session=True
         )
-        timer = threading.Timer(20.0, os.killpg, (process.pid, signal.SIGKILL))
+        timer = threading.Timer(120.0, os.killpg, (process.pid, signal.SIGKILL))
         timer.start()
         process.wait()
         timer.cancel()

@@ -248,6 +248,22 @@ def test_an_interrupt_while_a_command_imports_is_one_line(
     assert capsys.readouterr().err == "syncline-design: interrupted\n"
 
 
+def test_an_interrupt_while_the_arguments_are_read_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The parser turns one of its own time into an exit without a word."""
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "argv", ["syncline-design", "--version"])
+    monkeypatch.setattr("typer.core.TyperGroup.make_context", interrupted)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "syncline-design: interrupted\n"
+
+
 def test_a_store_that_is_a_file_is_a_slip_of_the_user(folder: Path) -> None:
     (folder / "study.yaml").write_text("study: 1\nname: s\nbase: good.yaml\n")
     (folder / "file").touch()

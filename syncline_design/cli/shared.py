@@ -116,7 +116,7 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
             refuse(f"syncline-design: {error}", NO_VERDICT)
         except KeyboardInterrupt:
             _end_quietly()
-            refuse("syncline-design: interrupted", INTERRUPTED)
+            raise typer.Exit(INTERRUPTED) from None  # which the entry point puts into words
         except MemoryError:
             refuse("syncline-design: out of memory; no verdict", NO_VERDICT)
         except BaseException as error:
