@@ -217,12 +217,14 @@ def test_the_time_limit_passes_through_whatever_unpacks(
 ) -> None:
     """A signal may strike while a message is unpacked: that is no foreign message."""
     from syncline_design.logs.readers import ros_recording
+    from syncline_design.logs.readers.ros_types import MessageType
     from syncline_design.machine.deadline import OutOfTime
 
     def struck(_: bytes) -> object:
         raise OutOfTime("over")
 
-    monkeypatch.setattr(ros_recording, "unpacker", lambda *_: struck)
+    struck_type = MessageType("", "ros1", {}, struck)
+    monkeypatch.setattr(ros_recording, "type_of", lambda *_: struck_type)
     with pytest.raises(OutOfTime):
         open_recording(write_ros1(tmp_path / "a.bag", flight(1.0))).streams()
 

@@ -41,8 +41,13 @@ class CloudTimes:
 
 def cloud_times(message: Any) -> CloudTimes | None:
     """Of a PointCloud2, a LaserScan or Livox's own message; None where points have no times."""
-    if message is None:
-        return None
+    try:
+        return None if message is None else _times_of(message)
+    except (AttributeError, TypeError, ValueError, IndexError, OverflowError):
+        return None  # a type of that name with other fields
+
+
+def _times_of(message: Any) -> CloudTimes | None:
     if hasattr(message, "point_step"):
         return _of_cloud(message)
     if hasattr(message, "time_increment"):

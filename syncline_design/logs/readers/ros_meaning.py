@@ -11,11 +11,13 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
+import numpy as np
+
 from syncline_design.logs.readers.stream import Body, Frame, StaticPose
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
-Row = tuple[float, ...]
+Row = tuple[Any, ...]  # figures of a message, or of many, each as an array
 NAN: Final = math.nan
 PLACE: Final = ("position_x_m", "position_y_m", "position_z_m")
 TURN: Final = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
@@ -59,16 +61,18 @@ def meaning_of(topic: str, kind: str, first: Any) -> TopicMeaning | None:
     """By type, with what the first message says of its frame; None for other types."""
     make = _maker(topic, kind)
     try:
-        return None if make is None else make(first)
-    except (AttributeError, TypeError, IndexError):  # a type of that name with other fields
-        return None
+        found = None if make is None else make(first)
+        with np.errstate(all="ignore"):
+            fits = found is None or len(np.array(found.row(first), float)) == len(found.columns)
+        return found if fits else None
+    except (AttributeError, TypeError, ValueError, IndexError, KeyError):
+        return None  # a type of that name with other fields
 
 
 def _turn(q: Any) -> Row:
     """A quaternion as w, x, y, z of length one; NaN where it is none."""
-    norm = math.sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z)
-    if not norm > LEAST_TURN:
-        return (NAN,) * 4
+    norm = np.sqrt(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z)
+    norm = np.where(norm > LEAST_TURN, norm, NAN)
     return q.w / norm, q.x / norm, q.y / norm, q.z / norm
 
 
@@ -182,10 +186,9 @@ def _fix(first: Any) -> TopicMeaning:
     def row(m: Any) -> Row:
         spread = (m.position_covariance[0], m.position_covariance[4], m.position_covariance[8])
         known = m.position_covariance_type != 0
-        place: Row = (m.latitude, m.longitude, m.altitude)
-        if m.status.status <= NO_FIX:
-            place = (NAN,) * 3
-        return (*place, *(spread if known else (NAN,) * 3), float(m.status.status))
+        found = m.status.status > NO_FIX
+        place = [np.where(found, v, NAN) for v in (m.latitude, m.longitude, m.altitude)]
+        return (*place, *(np.where(known, v, NAN) for v in spread), m.status.status)
 
     notes = ("heights are above the WGS 84 ellipsoid (sensor_msgs/NavSatFix)",)
     return TopicMeaning(("position",), (*GLOBE, *SPREAD, "fix_status"), row, "wgs84", notes=notes)
@@ -235,7 +238,7 @@ def _bestpos(first: Any) -> TopicMeaning:
 
 def _gps_time(m: Any) -> Row:
     header = m.nov_header
-    return float(header.gps_week_number), float(header.gps_week_milliseconds) * 1e-3
+    return header.gps_week_number, header.gps_week_milliseconds * 1e-3
 
 
 def _cloud(first: Any) -> TopicMeaning:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from syncline_design.logs.readers.point_times import CloudTimes, cloud_times
 from syncline_design.logs.readers.reader import library
 from syncline_design.logs.readers.ros_meaning import TopicMeaning, has_meaning, meaning_of
-from syncline_design.logs.readers.ros_types import BagChannel, StampOf, stamp_of, unpacker
+from syncline_design.logs.readers.ros_rows import PIECE_ROWS, Rows
+from syncline_design.logs.readers.ros_types import (
+    BagChannel,
+    MessageType,
+    StampOf,
+    stamp_of,
+    type_of,
+)
 from syncline_design.logs.readers.stream import (
     Incomplete,
     Nanoseconds,
@@ -26,16 +30,14 @@ from syncline_design.logs.readers.stream import (
 )
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
-from syncline_design.machine.deadline import NoVerdict, in_force
+from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 
-PIECE_ROWS = 20_000
 CHECK_EVERY = 8_192  # messages between two looks at the clock
 MOST_CLOUDS = 12  # of a topic, that are unpacked to see when their points were measured
 MOST_TOPICS = 20_000
 RATIO, FREE_BYTES = 200, 1 << 30  # a file may unpack to this many times its size, and this much
 RECORDED = "log time"
-NAN = float("nan")
 
 
 class DamagedError(Exception):
@@ -134,7 +136,7 @@ class _Tally:
     own_name: str
     own_of: StampOf | None
     meaning: TopicMeaning | None
-    unpack: Callable[[bytes], Any] | None
+    type_: MessageType | None
     logged: StampColumn = field(default_factory=StampColumn)
     own: StampColumn = field(default_factory=StampColumn)
     published_apart: bool = False
@@ -183,18 +185,19 @@ class RosRecording:
             raise refuse(self.path, "too many topics", expected=f"at most {MOST_TOPICS}")
         own = stamp_of(channel, self.path)
         known = has_meaning(channel.topic, channel.kind)
-        unpack = unpacker(channel, self.path) if known else None
-        first = _unpacked(unpack, message.data)
+        type_ = type_of(channel, self.path) if known else None
+        first = None if type_ is None else type_.unpacked(message.data)
         meaning = None if first is None else meaning_of(channel.topic, channel.kind, first)
         name, read = own or ("", None)
-        begun = _Tally(channel, name, read, meaning, unpack)
+        begun = _Tally(channel, name, read, meaning, type_)
         self._known[channel.topic, channel.kind] = begun
         return begun
 
-    def _rows(self, message: RawMessage) -> _Rows:
+    def _rows(self, message: RawMessage) -> Rows:
         """Rows of a topic, read as it was listed: its types are compiled once."""
         channel = message.channel
-        return _rows_of(self._known.get((channel.topic, channel.kind)) or self._begun(message, 0))
+        tally = self._known.get((channel.topic, channel.kind)) or self._begun(message, 0)
+        return Rows(tally.own_of, tally.meaning, tally.type_)
 
     def samples(self, name: str) -> Iterator[Piece]:
         if name not in self._channels:
@@ -202,13 +205,13 @@ class RosRecording:
         wanted = self._channels.get(name)
         if wanted is None:
             raise refuse(self.path, f"no stream {name}", found=", ".join(sorted(self._channels)))
-        collected: _Rows | None = None
+        collected: Rows | None = None
         for message in self._container.of_topics(frozenset({wanted.topic})):
             if message.channel.topic != wanted.topic or message.channel.kind != wanted.kind:
                 continue
             if collected is None:
                 collected = self._rows(message)
-            collected.add(message)
+            collected.add(message.log_ns, message.data)
             if collected.held >= PIECE_ROWS:
                 yield collected.piece()
         if collected is not None and collected.held:
@@ -219,8 +222,8 @@ class RosRecording:
         if not self._channels:
             self.streams()
         wanted = {(c.topic, c.kind): n for n, c in self._channels.items() if n in names}
-        rows: dict[str, _Rows] = {}
-        of_channel: dict[int, tuple[str, _Rows | None]] = {}  # the container keeps its channels
+        rows: dict[str, Rows] = {}
+        of_channel: dict[int, tuple[str, Rows | None]] = {}  # the container keeps its channels
         for message in self._container.of_topics(frozenset(topic for topic, _ in wanted)):
             channel = message.channel
             known = of_channel.get(id(channel))
@@ -232,69 +235,12 @@ class RosRecording:
             collected = known[1]
             if collected is None:
                 continue
-            collected.add(message)
+            collected.add(message.log_ns, message.data)
             if collected.held >= PIECE_ROWS:
                 yield known[0], collected.piece()
         for name, last in rows.items():
             if last.held:
                 yield name, last.piece()
-
-
-@dataclass(slots=True)
-class _Rows:
-    """Messages of one topic on their way into a piece; what cannot be unpacked is NaN."""
-
-    tally: _Tally
-    width: int
-    held: int = 0
-    values: array[float] = field(default_factory=lambda: array("d"))
-    primary: StampColumn = field(default_factory=StampColumn)
-    secondary: StampColumn = field(default_factory=StampColumn)
-
-    def add(self, message: RawMessage) -> None:
-        tally, data = self.tally, message.data
-        if tally.meaning is not None:
-            unpacked = _unpacked(tally.unpack, data)
-            self._hold(None if unpacked is None else tally.meaning.row(unpacked))
-        self.primary.append(tally.own_of(data) if tally.own_of is not None else message.log_ns)
-        self.secondary.append(message.log_ns)
-        self.held += 1
-
-    def _hold(self, row: Sequence[Any] | None) -> None:
-        """Figures of one message, as many as there are columns."""
-        if row is None or len(row) != self.width:
-            row = (NAN,) * self.width
-        try:
-            self.values.extend(row)
-        except TypeError:  # an array whose first figures stand already is set right
-            del self.values[self.held * self.width :]
-            self.values.extend(np.array(row, dtype=float).tolist())
-
-    def piece(self) -> Piece:
-        columns: Mapping[str, Any] = {}
-        if self.tally.meaning is not None:
-            table = np.array(self.values, dtype=float).reshape(self.held, self.width)
-            columns = {n: table[:, k] for k, n in enumerate(self.tally.meaning.columns)}
-        primary, secondary = self.primary.values(), self.secondary.values()
-        self.values, self.primary, self.secondary = array("d"), StampColumn(), StampColumn()
-        self.held = 0
-        return Piece(primary, secondary if self.tally.own_of is not None else None, columns)
-
-
-def _rows_of(tally: _Tally) -> _Rows:
-    return _Rows(tally, 0 if tally.meaning is None else len(tally.meaning.columns))
-
-
-def _unpacked(unpack: Callable[[bytes], Any] | None, data: bytes) -> Any:
-    """The message, or None where its bytes are not of its type."""
-    if unpack is None:
-        return None
-    try:
-        return unpack(data)
-    except NoVerdict:  # the time is over, wherever the signal struck
-        raise
-    except Exception:  # the generated code raises whatever foreign bytes lead it to
-        return None
 
 
 def _count(tally: _Tally, message: RawMessage) -> None:
@@ -308,7 +254,7 @@ def _count(tally: _Tally, message: RawMessage) -> None:
         tally.published_apart = tally.published_apart or published != message.log_ns
     meaning = tally.meaning
     if meaning is not None and meaning.is_cloud and len(tally.clouds) < MOST_CLOUDS:
-        times = cloud_times(_unpacked(tally.unpack, message.data))
+        times = cloud_times(None if tally.type_ is None else tally.type_.unpacked(message.data))
         tally.clouds += [times] if times is not None else []
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -133,8 +133,27 @@ def _standard_store(encoding: Encoding, typesys: Any) -> Any:
     return typesys.get_typestore(store)
 
 
-def unpacker(channel: BagChannel, path: Path) -> Callable[[bytes], Any] | None:
-    """A function from a message's bytes to the message; None where the type is not known.
+@dataclass(frozen=True, slots=True, eq=False)
+class MessageType:
+    """A type of messages with its definition; definitions: of it and of all that it names."""
+
+    kind: str
+    encoding: Encoding
+    definitions: Mapping[str, Any]
+    unpack: Callable[[bytes], Any]
+
+    def unpacked(self, data: bytes) -> Any:
+        """The message, or None where its bytes are not of its type."""
+        try:
+            return self.unpack(data)
+        except NoVerdict:  # the time is over, wherever the signal struck
+            raise
+        except Exception:  # the generated code raises whatever foreign bytes lead it to
+            return None
+
+
+def type_of(channel: BagChannel, path: Path) -> MessageType | None:
+    """How a channel's messages are unpacked; None where the type is not known.
 
     The bag's own definition goes before that of ROS: a type may have changed since.
     """
@@ -142,14 +161,11 @@ def unpacker(channel: BagChannel, path: Path) -> Callable[[bytes], Any] | None:
         return None
     typesys = library("rosbags.typesys", path, "ROS bag")
     store = _own_store(channel, typesys) or _standard(channel.encoding, path)
-    if channel.kind not in store.fielddefs:
-        return None
     kind = channel.kind
-    if channel.encoding == "ros1":
-        of_ros1 = store.deserialize_ros1
-        return lambda data: of_ros1(data, kind)
-    of_cdr = store.deserialize_cdr
-    return lambda data: of_cdr(data, kind)
+    if kind not in store.fielddefs:
+        return None
+    whole = store.deserialize_ros1 if channel.encoding == "ros1" else store.deserialize_cdr
+    return MessageType(kind, channel.encoding, store.fielddefs, lambda data: whole(data, kind))
 
 
 def _own_store(channel: BagChannel, typesys: Any) -> Any:
