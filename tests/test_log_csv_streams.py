@@ -222,3 +222,49 @@ def test_seconds_become_nanoseconds_to_the_last_digit() -> None:
     for value in (400825.001313, -0.25, 604799.9999999999, 1.4e9 + 0.1):
         exact = Decimal(value) * 10**9  # of the double itself
         assert nanoseconds_of(np.array([value]))[0] == int(exact.to_integral_value())
+
+
+def test_parquet_is_read_by_the_names_that_text_is_read_by(tmp_path: Path) -> None:
+    """Whole nanoseconds, calendar times and durations by their types; what is no figure is said."""
+    stamps = [1403636580838555648 + k * 5_000_000 for k in range(9)]
+    spans = pl.Series([stamps[0] + k for k in range(9)]).cast(pl.Duration("ns"))
+    rolls = [0.1 * k for k in range(9)]
+    frame = pl.DataFrame({"stamp_ns": stamps, "receive_s": spans, "roll_deg": rolls,
+                          "pitch_deg": rolls, "who": ["a"] * 9, "good": [True] * 9, "all": [[1.0]] * 9})  # fmt: skip
+    frame.write_parquet(tmp_path / "imu.parquet")
+    recording = open_recording(tmp_path / "imu.parquet")
+    stream = only(recording)
+    assert recording.format == "Parquet file"
+    assert (stream.messages, stream.timeline, stream.quantity) == (9, "utc", ("attitude",))
+    assert stream.stamps is not None
+    assert stream.stamps.primary_ns.tolist() == stamps
+    (piece,) = recording.samples("imu")
+    assert piece.columns["roll_deg"].tolist() == rolls
+    assert "not read, as they hold text: who, good, all" in stream.notes
+
+
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_calendar_times_of_parquet(tmp_path: Path, unit: str) -> None:
+    moments = pl.Series([1_700_000_000_123 + k for k in range(5)]).cast(pl.Datetime("ms"))
+    pl.DataFrame({"time": moments.cast(pl.Datetime(unit, "UTC")), "x": range(5)}).write_parquet(
+        tmp_path / "a.parquet"
+    )
+    stream = only(open_recording(tmp_path / "a.parquet"))
+    assert stream.timeline == "utc"
+    assert stream.stamps is not None
+    assert stream.stamps.primary_ns.tolist() == [
+        (1_700_000_000_123 + k) * 1_000_000 for k in range(5)
+    ]
+
+
+def test_damaged_parquet_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.parquet"
+    pl.DataFrame({"stamp_s": [0.1 * k for k in range(9)], "receive_s": range(9)}).write_parquet(
+        path
+    )
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(BadInput, match="no readable Parquet file"):
+        open_recording(path)
+    pl.DataFrame({"stamp_s": ["one"], "receive_s": ["two"]}).write_parquet(path)
+    with pytest.raises(BadInput, match="text among numbers in row 1"):
+        open_recording(path).streams()

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -16,7 +17,15 @@ from syncline_design.logs.inspection import inspect_logs, rate_hz
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
 from syncline_design.spec.log_block import LogChoice
-from tests.flight_logs import START_NS, flight, write_mcap, write_ros1, write_ulog
+from tests.flight_logs import (
+    START_NS,
+    Flight,
+    flight,
+    geodetic,
+    write_mcap,
+    write_ros1,
+    write_ulog,
+)
 from tests.test_diagnose_recordings import spec, tum
 
 MADE = flight(20.0)
@@ -164,8 +173,6 @@ def test_one_file_says_what_is_missing_for_a_diagnosis(tmp_path: Path) -> None:
 
 
 def test_rates_do_not_depend_on_gaps_packets_and_strays() -> None:
-    import numpy as np
-
     even = np.arange(0, 10_000_000_000, 10_000_000)
     packets = np.repeat(np.arange(0, 1_600_000_000, 16_000_000), 4)
     burst = np.concatenate([even, even + 3_600 * 10**9])
@@ -198,3 +205,110 @@ def test_stamps_far_from_all_others_are_told(tmp_path: Path) -> None:
     found = {s.name: s.notes for s in inspect_logs([tmp_path / "a.bag"]).streams}
     assert any("lie +90.500 s off" in note for note in found["/c"])
     assert not any("off those" in note for note in (*found["/a"], *found["/b"]))
+
+
+def as_table(path: Path, made: Flight, *, reference: bool = True, parquet: bool = False) -> Path:
+    """The package's own columns, places in degrees: attitude, and the better places."""
+    import polars as pl
+
+    globe = geodetic(made.place)
+    euler = np.degrees(made.turn.as_euler("ZYX")[:, ::-1])
+    columns = {"time": [calendar_text(int(ns)) for ns in made.stamp_ns]}
+    columns |= {f"{n}_deg": euler[:, k] for k, n in enumerate(("roll", "pitch", "yaw"))}
+    names = ("latitude_deg", "longitude_deg", "height_m")
+    columns |= {("reference_" * reference) + n: globe[:, k] for k, n in enumerate(names)}
+    frame = pl.DataFrame(columns)
+    if parquet:
+        frame = frame.with_columns(pl.col("time").str.to_datetime(time_unit="ns", time_zone="UTC"))
+        frame.write_parquet(path)
+    else:
+        frame.write_csv(path, float_precision=12)
+    return path
+
+
+def calendar_text(ns: int) -> str:
+    return f"{np.datetime64(ns, 'ns')}Z"
+
+
+@pytest.mark.parametrize("parquet", [False, True])
+def test_a_table_of_a_reference_beside_a_receivers_solution(tmp_path: Path, parquet: bool) -> None:
+    """The files that `diagnose` takes: what the table's columns say is not asked of the other."""
+    from tests.flat_flight_logs import write_pos
+
+    late = flight(45.0, late_s=0.2, noise_m=0.02)
+    files = [
+        write_pos(tmp_path / "rover.pos", late),
+        as_table(tmp_path / ("truth.parquet" if parquet else "truth.csv"), flight(45.0),
+                 parquet=parquet),
+    ]  # fmt: skip
+    found = as_json(*files)
+    streams = {s["name"]: s for s in found["streams"]}
+    assert streams["truth"]["quantity"] == ["attitude", "reference"]
+    assert (streams["truth"]["timeline"], streams["truth"]["messages"]) == ("utc", 450)
+    assert streams["truth"]["first_ns"] == START_NS
+    proposal = found["proposal"]
+    assert (proposal["kind"], proposal["lacking"]) == ("position", [])
+    parts = {p["role"]: (p["stream"], p["confidence"]) for p in proposal["parts"]}
+    assert parts == {"position": ("rover", "high"), "attitude": ("truth", "stated"),
+                     "reference": ("truth", "stated")}  # fmt: skip
+    assert proposal["log"]["streams"] == {"position": "rover"}
+    own, mapped = spec(tmp_path), tmp_path / "mapped.yaml"
+    assert run("log", "inspect", *files, "--spec", own, "--write-spec", mapped)[0] == 0
+    code, out, _ = run("diagnose", mapped, *files)
+    assert code == 1
+    said = re.search(r"Position data are ([0-9.]+) \S+ [0-9.]+ ms older", out)
+    assert said is not None, out[:600]
+    assert float(said.group(1)) == pytest.approx(200.0, abs=2.0)
+
+
+def test_ranges_in_a_table_are_not_asked_of_the_bag_beside_it(tmp_path: Path) -> None:
+    """What a table plays is no stream: a block that named it would be refused by `diagnose`."""
+    path = tmp_path / "ranges.csv"
+    rows = [f"{calendar_text(int(ns))},30,1,2,5,6,7" for ns in MADE.stamp_ns]
+    head = "time,range_m,azimuth_deg,elevation_deg,target_north_m,target_east_m,target_down_m"
+    path.write_text("\n".join([head, *rows]) + "\n", "utf-8")
+    proposal = as_json(write_ros1(tmp_path / "a.bag", MADE), path)["proposal"]
+    assert proposal["kind"] == "georeference"
+    assert set(proposal["log"]["streams"]) == {"position", "attitude"}
+    assert [p["stream"] for p in proposal["parts"] if p["role"] == "ranging"] == ["ranges"]
+
+
+def test_a_table_alone_needs_no_mapping(tmp_path: Path) -> None:
+    from tests.test_diagnose_recordings import table
+
+    path = table(tmp_path / "log.csv", MADE, MADE)
+    proposal = as_json(path)["proposal"]
+    assert (proposal["kind"], proposal["block"], proposal["lacking"]) == ("position", "", [])
+    own, mapped = spec(tmp_path), tmp_path / "mapped.yaml"
+    code, _, said = run("log", "inspect", path, "--spec", own, "--write-spec", mapped)
+    assert (code, mapped.read_text("utf-8")) == (0, own.read_text("utf-8"))
+    assert "the names of the columns are the mapping" in said
+    broken = tmp_path / "less.csv"
+    lines = [line.rpartition(",")[0] for line in path.read_text("utf-8").splitlines()]
+    broken.write_text("\n".join(lines).replace("reference_down_m", "other_m")
+                      .replace("reference_north_m", "more_m").replace("reference_east_m", "else_m"),
+                      "utf-8")  # fmt: skip
+    proposal = as_json(broken)["proposal"]
+    assert proposal["kind"] is None
+    assert "columns are missing: reference_north_m" in proposal["lacking"][0]
+
+
+def test_columns_that_the_spec_names_are_listed(tmp_path: Path) -> None:
+    """Without the spec nobody knows which column holds times."""
+    path = tmp_path / "log.csv"
+    rows = [f"{0.1 * k:.1f},{k},2,3,{k},2,3,1,2,{k}" for k in range(40)]
+    path.write_text("\n".join(["zeit,a,b,c,d,e,f,r,p,y", *rows]) + "\n", "utf-8")
+    names = {"time_s": "zeit"} | {
+        f"{what}_{axis}_m": letter
+        for (what, axis), letter in zip(
+            ((w, a) for w in ("position", "reference") for a in ("north", "east", "down")),
+            "abcdef", strict=True,
+        )
+    } | {"roll_deg": "r", "pitch_deg": "p", "yaw_deg": "y"}  # fmt: skip
+    columns = ", ".join(f"{name}: {theirs}" for name, theirs in names.items())
+    assert run("log", "inspect", path)[0] == 2
+    found = as_json(path, "--spec", spec(tmp_path, log=f"{{columns: {{{columns}}}}}"))
+    (stream,) = found["streams"]
+    assert (stream["messages"], stream["first_ns"], stream["last_ns"]) == (40, 0, 3_900_000_000)
+    assert stream["quantity"] == ["position", "attitude", "reference"]
+    assert found["proposal"]["kind"] == "position"

@@ -45,6 +45,7 @@ def inspect(
     """List the streams of logs, and propose how `diagnose` should read them."""
     deadline = deadline_of(time_limit)
     from syncline_design.logs.inspection import inspect_logs
+    from syncline_design.logs.log_files import ONE_STAGE
     from syncline_design.logs.static_arms import spec_arms
     from syncline_design.report.formats import LOG_FORMATS
     from syncline_design.report.on_log import on_log, render_log
@@ -58,7 +59,11 @@ def inspect(
         case = None if spec is None else load(spec)
         choice = None if case is None else case.spec.log
         found = inspect_logs(
-            file, choice, _has_attitude(case), None if case is None else spec_arms(case.spec)
+            file,
+            choice,
+            _has_attitude(case),
+            None if case is None else spec_arms(case.spec),
+            ONE_STAGE if case is None else [stage.name for stage in case.spec.stages],
         )
     say_unreadable(found.unreadable)
     if write_spec is not None and case is not None:
@@ -76,8 +81,9 @@ def _write(found: LogInspection, case: Case, path: Path) -> None:
     from syncline_design.spec.edit import with_log_text, write_spec
 
     block = found.proposal.log.to_json()
-    if not block:
+    if not block and found.proposal.kind is None:
         say("no mapping: no spec written")
         return
-    write_spec(with_log_text(case, block), path)
-    say(f"spec with the mapping written to {path}")
+    write_spec(with_log_text(case, block) if block else case.text, path)
+    said = "with the mapping " if block else "as it is (the names of the columns are the mapping) "
+    say(f"spec {said}written to {path}")

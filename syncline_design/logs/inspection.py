@@ -9,21 +9,18 @@ from typing import Annotated, Final, Literal
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.logs.log import LogKind
+from syncline_design.logs.log_files import ONE_STAGE, roles_of_table
+from syncline_design.logs.proposal import Proposal, proposed
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Stream
 from syncline_design.logs.readers.timelines import calendar
-from syncline_design.logs.roles import Offer, Part, Role, Sureness, offers_of, parts_of
-from syncline_design.logs.run_parts import KnownRecording, one_run
-from syncline_design.logs.sources import opened
+from syncline_design.logs.roles import ROLES, Role
+from syncline_design.logs.run_parts import KnownRecording
 from syncline_design.logs.static_arms import ArmBeside, arms_beside
-from syncline_design.logs.stream_sources import is_pose_pair, sources_of
-from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
-from syncline_design.logs.surveys import first_survey
+from syncline_design.logs.table_streams import named_table
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.figure_text import to_places
-from syncline_design.spec.edit import flow_text
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
 
@@ -107,47 +104,6 @@ class UnreadFile(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class ProposedPart(Record):
-    """Which stream plays which part, how sure that is, and why."""
-
-    role: Role
-    stream: str
-    file: str
-    confidence: Sureness
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
-class ProposedBlock(Record):
-    """A `log:` block that would read the files so; its keys are the spec's.
-
-    streams: by the role that each plays; the others of streams that do not say so themselves.
-    """
-
-    streams: Mapping[Role, str] | None = optional()
-    timeline: Literal["utc", "gps", "tai", "boot"] | None = optional()
-    gps_week: int | None = optional()
-    frame: Literal["enu", "ned"] | None = optional()
-    body: Literal["flu", "frd"] | None = optional()
-
-
-@dataclass(frozen=True, slots=True)
-class Proposal(Record):
-    """The mapping: as a `log:` block, and with reasons.
-
-    kind: what `diagnose` would compare; None where something is lacking.  conversions: everything
-    that is done to the values on the way.
-    """
-
-    kind: LogKind | None
-    log: ProposedBlock
-    block: str
-    parts: tuple[ProposedPart, ...]
-    conversions: tuple[str, ...]
-    lacking: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class LogInspection(Record):
     """What some files hold."""
 
@@ -168,18 +124,21 @@ class LogInspection(Record):
 def inspect_logs(
     paths: Sequence[Path], choice: LogChoice | None = None, poses: bool = True,
     arms: Mapping[str, tuple[float, float, float]] | None = None,
+    stages: Sequence[str] = ONE_STAGE,
 ) -> LogInspection:  # fmt: skip
     """Read the files and propose a mapping; a file that cannot be read is told, not raised.
 
     choice: what a spec already says of its log.  poses: whether attitudes may be compared too.
     arms: the spec's lever arms by `stage.role`, to be held against those that a log states.
+    stages: the spec's, by whose names columns of tables may begin.
     """
+    choice = choice or LogChoice()
     recordings: list[Recording] = []
     unread = []
     files, streams = [], []
     for path in paths:
         try:
-            recording = KnownRecording(open_recording(path))
+            recording = KnownRecording(_recording(path, choice, stages))
             found = recording.streams()
         except BadInput as error:
             unread.append(UnreadFile(str(path), str(error)))
@@ -187,14 +146,25 @@ def inspect_logs(
         recordings.append(recording)
         files.append(_file(recording, found))
         outside = _outside(found)
-        streams += [_stream(path, one, outside.get(one.name, ())) for one in found]
-    offers = offers_of(one_run(recordings))
-    proposal = _proposal(offers, choice or LogChoice(), poses)
+        roles = roles_of_table(path, choice.columns, stages)
+        streams += [_stream(path, one, outside.get(one.name, ()), roles) for one in found]
+    proposal = proposed(recordings, choice, poses, stages)
     static = [pose for one in recordings for stream in one.streams() for pose in stream.static]
     beside = arms_beside(static, arms or {})
     return LogInspection(
         SCHEMA, __version__, tuple(files), tuple(streams), proposal, tuple(unread), beside
     )  # fmt: skip
+
+
+def _recording(path: Path, choice: LogChoice, stages: Sequence[str]) -> Recording:
+    """A file by its reader, else by the names that the spec gives its columns."""
+    try:
+        return open_recording(path)
+    except BadInput:
+        table = named_table(path, choice.columns, stages) if choice.columns else None
+        if table is None:
+            raise
+        return table
 
 
 def _file(recording: Recording, found: Sequence[Stream]) -> InspectedFile:
@@ -208,7 +178,10 @@ def _file(recording: Recording, found: Sequence[Stream]) -> InspectedFile:
     )
 
 
-def _stream(path: Path, one: Stream, more: Sequence[str]) -> InspectedStream:
+def _stream(
+    path: Path, one: Stream, more: Sequence[str], roles: frozenset[Role]
+) -> InspectedStream:
+    """roles: that the columns of a table name, which are not all quantities to its reader."""
     stamps = one.stamps
     known = np.zeros(0, dtype=np.int64)
     if stamps is not None:
@@ -220,7 +193,7 @@ def _stream(path: Path, one: Stream, more: Sequence[str]) -> InspectedStream:
         name=one.name,
         file=str(path),
         kind=one.kind,
-        quantity=one.quantity,
+        quantity=tuple(dict.fromkeys((*one.quantity, *(r for r in ROLES if r in roles)))),
         messages=one.messages,
         rate_hz=rate_hz(known),
         first=None if first is None else first / NANO,
@@ -281,97 +254,3 @@ def _outside(found: Sequence[Stream]) -> dict[str, tuple[str, ...]]:
             )
             notes[name] = (*notes.get(name, ()), words)
     return notes
-
-
-def _proposal(offers: Sequence[Offer], choice: LogChoice, poses: bool) -> Proposal:
-    if not offers:
-        return Proposal(None, ProposedBlock(), "", (), (), ("no file could be read",))
-    try:
-        parts = parts_of(offers, choice)
-    except BadInput as error:
-        return Proposal(None, ProposedBlock(), "", (), (), (str(error),))
-    lacking, conversions, shows = _tried(offers, choice, poses)
-    shown = _used(parts, poses)
-    named = {role: part for role, part in shown.items() if role in _NAMED or part.sure == "stated"}
-    block = ProposedBlock(
-        {role: _name(part.offer, offers) for role, part in named.items()} if shown else None,
-        choice.timeline, choice.gps_week, *_axes(shown, choice, shows),
-    )  # fmt: skip
-    return Proposal(
-        kind=None if lacking else _kind(shown, poses),
-        log=block,
-        block=_text(block),
-        parts=tuple(
-            ProposedPart(role, p.offer.name, str(p.offer.path), p.sure, p.why)
-            for role, p in shown.items()
-        ),
-        conversions=conversions,
-        lacking=lacking,
-    )
-
-
-_NAMED: Final = ("position", "attitude", "ranging", "target", "reference")
-
-
-def _tried(
-    offers: Sequence[Offer], choice: LogChoice, poses: bool
-) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
-    """What keeps the mapping from working, else everything that it does to the values.
-
-    And whether places in WGS 84 showed axes that a file does not tell.
-    """
-    try:
-        lists = [o.path for o in offers if o.has("target") and o.stream.stamps is None]
-        survey = first_survey([opened(path) for path in lists], choice.columns, ())
-        sources = sources_of(offers, choice, "", poses, survey=survey)
-    except BadInput as error:
-        return (str(error),), (), False
-    notes = tuple(dict.fromkeys(note for one in sources for note in one.notes))
-    return (), notes, any(one.shown == "ned" for one in sources)
-
-
-def _used(parts: dict[Role, Part], poses: bool) -> dict[Role, Part]:
-    """As `diagnose` will use them: of two poses the attitude is the tested one's."""
-    if not (poses and is_pose_pair(parts)):
-        return parts
-    tested = parts["position"]
-    kept: dict[Role, Part] = {r: p for r, p in parts.items() if r != "rate"}
-    kept["attitude"] = Part("attitude", tested.offer, tested.sure, "the tested trajectory's own")
-    return kept
-
-
-def _kind(parts: dict[Role, Part], poses: bool) -> LogKind:
-    if "ranging" in parts:
-        return "georeference"
-    return "pose" if poses and is_pose_pair(parts) else "position"
-
-
-def _name(offer: Offer, offers: Sequence[Offer]) -> str:
-    """How the spec names a stream: by its own name, with its file's where several have it."""
-    same = [one for one in offers if one.name == offer.name]
-    return offer.name if len(same) == 1 else f"{offer.path.name}:{offer.name}"
-
-
-def _axes(
-    parts: dict[Role, Part], choice: LogChoice, shows: bool
-) -> tuple[Literal["enu", "ned"] | None, Literal["flu", "frd"] | None]:
-    """Frame and body as stated; where a stream in use does not tell, the assumed, to be seen.
-
-    shows: places in WGS 84 showed one such stream to be north, east, down; beside another that
-    does not tell, the block has one word for both and says none: `diagnose` looks again.
-    """
-    frame, body = choice.frame, choice.body
-    streams = list({id(p.offer): p.offer.stream for p in parts.values()}.values())
-    local = {"position_x_m", "quaternion_w", "velocity_x_mps"}
-    untold = [s for s in streams if s.frame == "unknown" and local & set(s.columns)]
-    if untold and frame is None:
-        seen: Literal["ned"] | None = "ned" if len(untold) == 1 else None
-        frame = seen if shows else ASSUMED_FRAME
-    if any(s.body == "unknown" and "quaternion_w" in s.columns for s in streams):
-        body = body or ASSUMED_BODY
-    return frame, body
-
-
-def _text(block: ProposedBlock) -> str:
-    keys = block.to_json()
-    return f"log: {flow_text(keys)}" if keys else ""

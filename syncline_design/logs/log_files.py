@@ -28,12 +28,43 @@ from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
 from syncline_design.logs.static_arms import arm_notes, arms_beside
 from syncline_design.logs.stream_sources import sources_of
-from syncline_design.logs.surveys import first_survey
+from syncline_design.logs.surveys import Survey, first_survey
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
 
 TABLES = (".parquet", ".pq")
+ONE_STAGE = ("stage",)  # where no spec names stages: columns then begin with none of them
 TEXT_TABLE = "csv_text"  # the reader of delimited text, whose files `sources` reads by their names
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SortedFiles:
+    """The files of a call: those that are read by the names of their columns, and all others.
+
+    held: the parts that the tables play, in all and table by table.
+    """
+
+    tables: tuple[RowSource, ...]
+    recordings: tuple[Path, ...]
+    held: frozenset[Role]
+    held_by: tuple[frozenset[Role], ...]
+    survey: Survey | None
+
+
+def sorted_files(
+    paths: Sequence[Path], mapping: Mapping[str, str], stages: Sequence[str]
+) -> SortedFiles:
+    """Which files are tables, and which are recordings; raises BadInput of a table."""
+    once = list(dict.fromkeys(paths))
+    tables = [t for t in (_table(path, mapping, stages) for path in once) if t is not None]
+    if len(tables) < len(once):  # a trajectory beside recordings is one more of them
+        tables = [one for one in tables if not _is_trajectory(one, mapping, stages)]
+    read = {one.path for one in tables}
+    held = tuple(_held(one, mapping, stages) for one in tables)
+    survey = first_survey(tables, mapping, stages)
+    others = tuple(path for path in once if path not in read)
+    return SortedFiles(tuple(tables), others, frozenset().union(*held), held, survey)
 
 
 def row_sources(
@@ -44,24 +75,29 @@ def row_sources(
 
     arms: the spec's lever arms by `stage.role`, to be held against those that a log states.
     """
-    found = {path: _table(path, choice.columns, stages) for path in paths}
-    tables = [table for table in found.values() if table is not None]
-    if len(tables) == len(found):
-        return tables
-    tables = [one for one in tables if not _is_trajectory(one, choice.columns, stages)]
-    read = {one.path for one in tables}
-    recordings = [open_recording(path) for path in paths if path not in read]
+    files = sorted_files(paths, choice.columns, stages)
+    if not files.recordings:
+        return list(files.tables)
+    run = one_run([open_recording(path) for path in files.recordings])
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
-    held = _held(tables, choice.columns, stages)
-    run = one_run(recordings)
-    survey = first_survey(tables, choice.columns, stages)
     sources = sources_of(
-        offers_of(run), choice, prefix, poses, held, survey, _arms(arms or {}, stages)
+        offers_of(run), choice, prefix, poses, files.held, files.survey, _arms(arms or {}, stages)
     )
     static = [pose for one in run for stream in one.streams() for pose in stream.static]
     for source in sources[:1]:
         source.notes += arm_notes(arms_beside(static, arms or {}))
-    return [*tables, *sources]
+    return [*files.tables, *sources]
+
+
+def roles_of_table(
+    path: Path, mapping: Mapping[str, str], stages: Sequence[str]
+) -> frozenset[Role]:
+    """The parts that a file plays by the names of its columns; none of what is no table."""
+    try:
+        table = _table(path, mapping, stages)
+    except BadInput:
+        return frozenset()
+    return frozenset() if table is None else _held(table, mapping, stages)
 
 
 def _arms(arms: Mapping[str, tuple[float, float, float]], stages: Sequence[str]) -> Arms:
@@ -72,13 +108,9 @@ def _arms(arms: Mapping[str, tuple[float, float, float]], stages: Sequence[str])
     return np.asarray(ranging), np.asarray(antenna)
 
 
-def _held(
-    tables: Sequence[RowSource], mapping: Mapping[str, str], stages: Sequence[str]
-) -> frozenset[Role]:
-    """The parts that tables beside the recordings play."""
-    names: set[str] = set()
-    for table in tables:
-        names |= set(si_columns(table.header, mapping, known_names(stages)))
+def _held(table: RowSource, mapping: Mapping[str, str], stages: Sequence[str]) -> frozenset[Role]:
+    """The parts that a table plays by its columns."""
+    names = si_columns(table.header, mapping, known_names(stages))
     last, first = (f"{s}_" if len(stages) > 1 else "" for s in (stages[-1], stages[0]))
     told: dict[Role, bool] = {
         "ranging": last + RANGING[0] in names,

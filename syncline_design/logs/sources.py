@@ -358,22 +358,43 @@ class ParquetSource:
         import polars as pl
 
         kind = self._schema[name]
-        if kind == pl.Datetime or kind == pl.Date:
+        if self.is_calendar(name):
             zoned = isinstance(kind, pl.Datetime) and kind.time_zone is not None
-            return Clock(None, self._calendar(name), zoned)
+            return Clock(None, self.calendar(name), zoned)
         if kind == pl.Duration:
             return Clock(spans(self._column(name)), None, spans=True)
         if self._is_text(name):
             return self._text_clock(name)
         return Clock(self._figures(name), None)
 
-    def _calendar(self, name: str) -> StampArray:
+    def is_calendar(self, name: str) -> bool:
+        """Whether a column holds times of a calendar by its type."""
+        import polars as pl
+
+        return self._schema[name] == pl.Datetime or self._schema[name] == pl.Date
+
+    def text(self, name: str, start: int, rows: int) -> pl.Series:
+        """Some cells as they would be written: of figures every digit, of durations seconds."""
+        import polars as pl
+
+        kind = self._schema[name]
+        if kind.is_nested() or kind == pl.Binary or kind == pl.Object:
+            return pl.Series([str(kind)] * rows, dtype=pl.String)
+        if kind in (pl.String, pl.Categorical, pl.Enum):
+            self._demand_short(name)
+        column = self._column(name, start, rows)
+        if kind == pl.Duration:
+            return pl.Series(spans(column)).fill_nan(None).cast(pl.String)
+        return column.cast(pl.String)
+
+    def calendar(self, name: str, start: int = 0, rows: int | None = None) -> StampArray:
+        """Calendar times [ns since 1970]."""
         try:
-            return calendar(self._column(name))
+            return calendar(self._column(name, start, rows))
         except FarTimeError as far:
             raise refuse(
                 self.path,
-                f"no time of a log in row {far.row + 1}",
+                f"no time of a log in row {start + far.row + 1}",
                 field=name,
                 expected="a year from 1678 to 2261, or nothing",
                 found=far.found,

@@ -85,7 +85,7 @@ def sources_of(
     of two trajectories both places and attitudes are compared.  held: parts that other files play.
     survey, arms: of targets and of the vehicle, for ranges that a cloud's points tell.
     """
-    parts = _left(parts_of(offers, choice, surveyed="target" in held), held)
+    parts = left_of(parts_of(offers, choice, surveyed="target" in held), held)
     _demand_parts(offers, {*parts, *held})
     pair = poses and is_pose_pair(parts)
     if pair:
@@ -126,7 +126,7 @@ def _of_the_tested(parts: Mapping[Role, Part]) -> dict[Role, Part]:
     return kept
 
 
-def _left(parts: Mapping[Role, Part], held: frozenset[Role]) -> dict[Role, Part]:
+def left_of(parts: Mapping[Role, Part], held: frozenset[Role]) -> dict[Role, Part]:
     """The parts that no other file plays; ranges and a reference do not go together."""
     kept = {role: part for role, part in parts.items() if role not in held or part.sure == "stated"}
     reference = kept.get("reference")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,13 +40,13 @@ class CsvRecording(BatchRecording):
     """Delimited text with a header."""
 
     format = "CSV file"
+    kind = "CSV"
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         demand_plain_file(path)
-        self._source = TextSource(path)
-        self._how = self._source.how
-        self._layout = layout_of(self._how.names)
+        self._names, self._title_line = self._opened(path)
+        self._layout = layout_of(self._names)
         self._name = path.stem
         self._demand_times()
         self._text: set[int] = set()  # places of columns that hold names, not figures
@@ -55,15 +55,25 @@ class CsvRecording(BatchRecording):
         self._powers: dict[int, int] = {}  # of a thousand, by which a column of times is divided
         self._seen: Nanoseconds = np.zeros(0, dtype=np.int64)
 
+    def _opened(self, path: Path) -> tuple[Sequence[str], int]:
+        """The names of the columns, and the line that they stand in."""
+        self._source = TextSource(path)
+        self._how = self._source.how
+        self._comma = self._how.comma_is_decimal
+        return self._how.names, self._how.line
+
+    def _blocks(self) -> Iterator[delimited.RowBlock]:
+        return delimited.blocks(self.path, self._how, self._source.end)
+
     def _demand_times(self) -> None:
         """One unit of the stamps, and something besides them or two of them."""
         for stem in ("stamp", "receive"):
-            several = time_columns(self._how.names, stem)
+            several = time_columns(self._names, stem)
             if len(several) > 1:
                 raise refuse(
                     self.path,
                     f"two columns of {stem}s",
-                    line=self._how.line,
+                    line=self._title_line,
                     column=several[1].place + 1,
                     expected=f"one of {stem}_s, {stem}_ms, {stem}_us, {stem}_ns",
                     found=", ".join(c.name for c in several)[:80],
@@ -73,17 +83,17 @@ class CsvRecording(BatchRecording):
             raise refuse(
                 self.path,
                 "no column of times",
-                line=self._how.line,
+                line=self._title_line,
                 column=1,
                 expected="stamp_<unit> and receive_<unit>, or time_s, time_ms, time_us, time_ns, "
                 "or ISO 8601 times in a column `time`",
-                found=", ".join(self._how.names[:12])[:200],
+                found=", ".join(self._names[:12])[:200],
             )
 
     def _batches(self, wanted: str | None) -> Iterator[Batch]:
         seen: list[Nanoseconds] = []
         rows = 0
-        for block in delimited.blocks(self.path, self._how, self._source.end):
+        for block in self._blocks():
             rows += int(block.lines.shape[0])
             primary = self._times(block, self._layout.primary)
             secondary = self._times(block, self._layout.secondary)
@@ -98,10 +108,13 @@ class CsvRecording(BatchRecording):
 
     def _finish(self, rows: int, seen: list[Nanoseconds]) -> None:
         if not rows:
-            raise refuse(self.path, "no rows below the header", line=self._how.line, column=1)
+            raise refuse(self.path, "no rows below the header", line=self._title_line, column=1)
         self._seen = np.concatenate(seen) if seen else np.zeros(0, dtype=np.int64)
-        if self._source.cut:
+        if self._is_cut():
             self._cut("the last row is cut", rows)
+
+    def _is_cut(self) -> bool:
+        return bool(self._source.cut)
 
     def _times(self, block: delimited.RowBlock, column: TimeColumn | None) -> Nanoseconds | None:
         if column is None:
@@ -124,7 +137,7 @@ class CsvRecording(BatchRecording):
         raise refuse(
             self.path,
             "times without a unit",
-            line=self._how.line,
+            line=self._title_line,
             column=column.place + 1,
             field=column.name,
             expected="a unit in the name, as in time_s or stamp_us, or ISO 8601 times",
@@ -160,7 +173,7 @@ class CsvRecording(BatchRecording):
             return None
         cells = self._cells(block, place)
         try:
-            return numbers(cells, self._how.comma_is_decimal)[0]
+            return numbers(cells, self._comma)[0]
         except BadCellError as bad:
             if not known and self._first_block(block) and any(c.isalpha() for c in bad.text):
                 self._text.add(place)
@@ -189,7 +202,7 @@ class CsvRecording(BatchRecording):
             "text among numbers",
             line=int(block.lines[bad.row]),
             column=place + 1,
-            field=self._how.names[place],
+            field=self._names[place],
             expected=bad.expected,
             found=repr(bad.text[:40]),
             hint=bad.hint,
@@ -198,7 +211,7 @@ class CsvRecording(BatchRecording):
     def _facts(self, name: str) -> StreamFacts:
         layout: Layout = self._layout
         timeline, label, notes = self._timeline()
-        skipped = [self._how.names[place] for place in sorted(self._text)]
+        skipped = [self._names[place] for place in sorted(self._text)]
         if skipped:
             notes = (*notes, f"not read, as they hold text: {', '.join(skipped)[:200]}")
         return StreamFacts(
@@ -210,7 +223,7 @@ class CsvRecording(BatchRecording):
             secondary=layout.secondary.name if layout.secondary else None,
             notes=(*notes, *self._too_large()),
             body="frd" if "attitude" in layout.quantity or "rate" in layout.quantity else "unknown",
-            kind="CSV",
+            kind=self.kind,
         )
 
     def _power(self, column: TimeColumn | None) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sqlite3
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -30,9 +30,11 @@ METADATA = "metadata.yaml"
 MOST_METADATA = 1 << 24
 MOST_MESSAGE = 1 << 28
 MOST_FILES = 10_000
+MOST_NESTED = 50  # levels of a metadata.yaml; a bag's own has six
 SMALL = 8_192  # bytes; of longer messages that much is read where stamps are all that is wanted
 WHOLE = 16  # messages of a topic that are read to their ends all the same: they say what it is
 STEPS = 100_000  # of SQLite's machine between two looks at the clock
+_DIGITS = re.compile(r"-?[0-9]{1,20}", re.ASCII)
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
@@ -55,6 +57,8 @@ class Ros2Bag(Container):
             raise DamagedError("; ".join(faults)[:400])
 
     def _of(self, path: Path) -> Iterator[RawMessage]:
+        if not path.is_file():
+            raise DamagedError("no regular file" if path.exists() else "is not there")
         try:
             with path.open("rb") as file:
                 head = file.read(16)
@@ -96,18 +100,34 @@ def _by_number(path: Path) -> tuple[list[int], str]:
 def _named(path: Path) -> list[str]:
     import yaml
 
-    if not path.is_file():
+    if not path.is_file():  # a FIFO would never end
         return []
     try:
         text = path.read_bytes()[: MOST_METADATA + 1]
         if len(text) > MOST_METADATA or text.count(b"&") > 1000:
             raise refuse(path, "no metadata of a bag", expected=f"at most {MOST_METADATA} bytes")
-        data = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+        if _depth_of(yaml.parse(text, loader)) > MOST_NESTED:
+            raise refuse(path, "no metadata of a bag", expected=f"at most {MOST_NESTED} levels")
+        data = yaml.load(text, loader)
         files = data["rosbag2_bagfile_information"]["relative_file_paths"]
         return [str(name) for name in files]
     except (OSError, yaml.YAMLError, KeyError, TypeError, RecursionError) as error:
         short = (str(error).splitlines() or [type(error).__name__])[0][:160]
         raise refuse(path, "no metadata of a bag", found=short) from None
+
+
+def _depth_of(events: Iterable[Any]) -> int:
+    """How deep a document is nested: what builds it would crash where that is absurd."""
+    depth = deepest = 0
+    for event in events:
+        name = type(event).__name__
+        depth += name.endswith(("MappingStartEvent", "SequenceStartEvent"))
+        depth -= name.endswith(("MappingEndEvent", "SequenceEndEvent"))
+        deepest = max(deepest, depth)
+        if deepest > MOST_NESTED:
+            break
+    return deepest
 
 
 def _of_database(path: Path, wanted: frozenset[str] | None, brief: bool) -> Iterator[RawMessage]:
@@ -128,14 +148,15 @@ def _of_database(path: Path, wanted: frozenset[str] | None, brief: bool) -> Iter
         channels, packed = _channels(file, path)
         budget = UnpackBudget(path, path.stat().st_size)
         only = [n for n, c in channels.items() if wanted is not None and c.topic in wanted]
-        part = brief and not packed and _is_whole(path)
+        part = brief and not packed and _is_whole(path) and _has_rowid(file)
         with closing(_rows(file, only, brief=part)) as rows:
             for topic, stamp, data in rows:
                 channel = channels.get(topic)
-                if channel is None or not isinstance(stamp, int) or not isinstance(data, bytes):
-                    raise DamagedError("a message of no known topic, or without a time")
+                if channel is None or not isinstance(data, bytes):
+                    raise DamagedError("a message of no known topic, or without its data")
+                log_ns = stamp if isinstance(stamp, int) else _whole(stamp)
                 whole = _plain(data, budget, path) if packed else data
-                yield RawMessage(channel, stamp, None, whole)
+                yield RawMessage(channel, log_ns, None, whole)
     except sqlite3.Error as error:
         in_force().check()
         raise DamagedError(str(error)[:160]) from None
@@ -154,17 +175,38 @@ def _rows(
         )
         return
     # neither the length nor the type of a value makes SQLite read it
-    small = f"CASE WHEN length(data) <= {SMALL} OR typeof(data) <> 'blob' THEN data END"
+    large = f"length(data) > {SMALL} AND typeof(data) = 'blob'"
     seen: dict[Any, int] = {}
-    for topic, stamp, data, number in file.execute(
-        f"SELECT topic_id, timestamp, {small}, id FROM messages {some} ORDER BY id", only
+    for topic, stamp, data, row in file.execute(
+        f"SELECT topic_id, timestamp, CASE WHEN {large} THEN NULL ELSE data END, "
+        f"CASE WHEN {large} THEN rowid END FROM messages {some} ORDER BY id",
+        only,
     ):
-        if data is not None:
+        if row is None:
             yield topic, stamp, data
             continue
         seen[topic] = seen.get(topic, 0) + 1
-        with file.blobopen("messages", "data", number, readonly=True) as blob:
+        with file.blobopen("messages", "data", row, readonly=True) as blob:
+            if len(blob) > MOST_MESSAGE:
+                raise DamagedError(f"a message of {len(blob)} bytes")
             yield topic, stamp, blob.read() if seen[topic] <= WHOLE else blob.read(SMALL)
+
+
+def _has_rowid(file: sqlite3.Connection) -> bool:
+    """Whether a message can be opened by its row: not in a table `WITHOUT ROWID`, or of none."""
+    try:
+        file.execute("SELECT rowid FROM messages LIMIT 1").fetchone()
+    except sqlite3.OperationalError:
+        return False
+    return True
+
+
+def _whole(stamp: Any) -> int:
+    """A time that a database holds as text: whole nanoseconds in digits, and nothing else."""
+    text = stamp.strip() if isinstance(stamp, str) else ""
+    if not _DIGITS.fullmatch(text):
+        raise DamagedError(f"a message with the time {str(stamp)[:40]!r}, no whole nanoseconds")
+    return int(text)
 
 
 def _is_whole(path: Path) -> bool:
@@ -209,8 +251,9 @@ def _channels(file: sqlite3.Connection, path: Path) -> tuple[dict[Any, BagChanne
 
 def _is_packed(path: Path) -> bool:
     """Whether every message is compressed by itself, as metadata.yaml beside the file tells."""
+    beside = path.parent / METADATA
     try:
-        text = (path.parent / METADATA).read_bytes()[:MOST_METADATA]
+        text = beside.read_bytes()[:MOST_METADATA] if beside.is_file() else b""
     except OSError:
         return False
     return bool(re.search(rb"compression_mode:\s*['\"]?message", text, re.IGNORECASE))

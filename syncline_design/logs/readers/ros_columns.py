@@ -50,10 +50,10 @@ class Place:
         """The figure of every message; of an array one row an element."""
         messages, length = block.shape
         kind = np.dtype(self.written)
-        shape, strides = ((messages,), (length,))
-        if self.count is not None:
-            shape, strides = (self.count, messages), (kind.itemsize, length)
-        found = np.ndarray(shape, kind, block, self.at, strides)
+        one = self.count is None
+        shape = (messages,) if one else (self.count, messages)
+        strides = (length,) if one else (kind.itemsize, length)
+        found: NDArray[Any] = np.ndarray(shape, kind, block, self.at, strides)
         return (
             found.astype(np.float64) if kind.kind == "f" else found.astype(kind.newbyteorder("="))
         )
@@ -131,7 +131,10 @@ class _Walk:
         if node == _NAME:
             return self.fields_of(what, depth + 1)
         if node == _BASE:
-            return self._text() if what[0] == "string" else self._figure(what[0], None)
+            if what[0] != "string":
+                return self._figure(what[0], None)
+            self._text()
+            return None
         inner, count = what
         if node != _ARRAY:
             count = self._count()
