@@ -91,6 +91,7 @@ def connection(number: int, **own: bytes) -> bytes:
 
 UNREADABLE: dict[str, Callable[[Path], bytes]] = {
     "bag: the magic alone": lambda _: BAG_MAGIC,
+    "bag: closed without a message": lambda _: BAG_MAGIC + bag_head(len(BAG_MAGIC + bag_head())),
     "bag: no bag header": lambda _: BAG_MAGIC + bag_record(op=b"\x05"),
     "bag: header longer than any": lambda _: BAG_MAGIC + b"\xff\xff\xff\x7f" * 4,
     "bag: field without a name": lambda _: BAG_MAGIC
@@ -117,6 +118,12 @@ UNREADABLE: dict[str, Callable[[Path], bytes]] = {
     + bag_record(
         struct.pack("<I", 500) + b"x", op=b"\x05", compression=b"none", size=struct.pack("<I", 5)
     ),
+    "bag: a topic of 100 kB": lambda _: BAG_MAGIC
+    + bag_head()
+    + bag_record(
+        bag_record(type=b"a/B", md5sum=b"*")[4:-4], op=b"\x07", conn=bytes(4), topic=b"/a" * 50_000
+    )
+    + bag_record(b"x", op=b"\x02", conn=bytes(4), time=bytes(8)),
     "bag: zeros": lambda _: BAG_MAGIC + bytes(5000),
     "bag: version 1": lambda _: b"#ROSBAG V1.1\n" + bytes(500),
     "mcap: the magic alone": lambda _: MCAP_MAGIC,
@@ -125,6 +132,7 @@ UNREADABLE: dict[str, Callable[[Path], bytes]] = {
     "mcap: bomb by its own word": lambda _: mcap_head() + chunk(1 << 40, "zstd", zstd(b"x")),
     "mcap: bomb that hides": lambda _: mcap_head() + chunk(10, "zstd", zstd(bytes(50_000_000))),
     "mcap: lz4 bomb that hides": lambda _: mcap_head() + chunk(10, "lz4", lz4(bytes(50_000_000))),
+    "mcap: chunk of zeros": lambda _: mcap_head() + chunk(90_000, "zstd", zstd(bytes(90_000))),
     "mcap: chunk of garbage": lambda _: mcap_head() + chunk(10, "zstd", b"\x01" * 40),
     "mcap: wrong checksum": lambda _: mcap_head() + chunk(9, "", message(1)[:9], zlib.crc32(b"x")),
     "mcap: packed as nobody does": lambda _: mcap_head() + chunk(4, "brotli", b"abcd"),
@@ -144,6 +152,10 @@ UNREADABLE: dict[str, Callable[[Path], bytes]] = {
     "ulog: no timestamp": lambda _: ULOG_HEAD
     + ulog_record("F", b"a:float x")
     + ulog_record("A", b"\x00\x01\x00a"),
+    "ulog: more topics than any": lambda _: ULOG_HEAD
+    + ulog_record("F", b"a:uint64_t timestamp")
+    + b"".join(ulog_record("A", struct.pack("<BH", 0, k) + b"a") for k in range(3000))
+    + ulog_record("D", bytes(10)),
     "ulog: zeros": lambda _: ULOG_HEAD + bytes(1000),
     "database: SQLite's magic alone": lambda _: b"SQLite format 3\x00",
     "database: pages of garbage": lambda _: b"SQLite format 3\x00" + bytes(range(256)) * 40,

@@ -229,8 +229,9 @@ def test_parquet_is_read_by_the_names_that_text_is_read_by(tmp_path: Path) -> No
     stamps = [1403636580838555648 + k * 5_000_000 for k in range(9)]
     spans = pl.Series([stamps[0] + k for k in range(9)]).cast(pl.Duration("ns"))
     rolls = [0.1 * k for k in range(9)]
-    frame = pl.DataFrame({"stamp_ns": stamps, "receive_s": spans, "roll_deg": rolls,
-                          "pitch_deg": rolls, "who": ["a"] * 9, "good": [True] * 9, "all": [[1.0]] * 9})  # fmt: skip
+    others = {"who": ["a"] * 9, "good": [True] * 9, "all": [[1.0]] * 9}
+    turns = {"roll_deg": rolls, "pitch_deg": rolls}
+    frame = pl.DataFrame({"stamp_ns": stamps, "receive_s": spans, **turns, **others})
     frame.write_parquet(tmp_path / "imu.parquet")
     recording = open_recording(tmp_path / "imu.parquet")
     stream = only(recording)

@@ -14,7 +14,7 @@ import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from syncline_design.logs.readers import open_recording
-from syncline_design.logs.readers.ros_columns import Shape, UnevenError
+from syncline_design.logs.readers.ros_columns import MessageForm, UnevenError
 from syncline_design.logs.readers.ros_meaning import meaning_of
 from syncline_design.logs.readers.ros_rows import MOST_SHAPES, FiguresOf
 from syncline_design.logs.readers.ros_types import Encoding, MessageType
@@ -166,7 +166,7 @@ def test_the_other_byte_order_is_unpacked_by_the_library() -> None:
     made = [drawn(store, kind, rng, "imu", 0) for _ in range(20)]
     messages = [bytes(store.serialize_cdr(m, kind, little_endian=False)) for m in made]
     with pytest.raises(UnevenError):
-        Shape(messages[0], store.fielddefs, kind, "cdr")
+        MessageForm(messages[0], store.fielddefs, kind, "cdr")
     type_, _ = type_of(store, "cdr", kind)
     meaning = meaning_of("/a", kind, made[0])
     assert meaning is not None

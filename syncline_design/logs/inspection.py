@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.logs.log_files import ONE_STAGE, roles_of_table
+from syncline_design.logs.log_files import ONE_STAGE, roles_of_table, some_offers
 from syncline_design.logs.proposal import Proposal, proposed
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Stream
@@ -139,7 +139,7 @@ def inspect_logs(
     for path in paths:
         try:
             recording = KnownRecording(_recording(path, choice, stages))
-            found = recording.streams()
+            found = [offer.stream for offer in some_offers([recording])]
         except BadInput as error:
             unread.append(UnreadFile(str(path), str(error)))
             continue

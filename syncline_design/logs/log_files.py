@@ -23,7 +23,9 @@ from syncline_design.logs.columns import (
 )
 from syncline_design.logs.readers import open_recording, reader_of, registry
 from syncline_design.logs.readers.reader import head_of
-from syncline_design.logs.roles import Role, offers_of
+from syncline_design.logs.readers.stream import Recording
+from syncline_design.logs.refusals import refuse
+from syncline_design.logs.roles import Offer, Role, offers_of
 from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
 from syncline_design.logs.static_arms import arm_notes, arms_beside
@@ -81,12 +83,21 @@ def row_sources(
     run = one_run([open_recording(path) for path in files.recordings])
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
     sources = sources_of(
-        offers_of(run), choice, prefix, poses, files.held, files.survey, _arms(arms or {}, stages)
+        some_offers(run), choice, prefix, poses, files.held, files.survey, _arms(arms or {}, stages)
     )
     static = [pose for one in run for stream in one.streams() for pose in stream.static]
     for source in sources[:1]:
         source.notes += arm_notes(arms_beside(static, arms or {}))
     return [*files.tables, *sources]
+
+
+def some_offers(recordings: Sequence[Recording]) -> list[Offer]:
+    """The streams of recordings; refuses where there is none at all."""
+    offers = offers_of(recordings)
+    if not offers:
+        first = recordings[0]
+        raise refuse(first.path, "no message in the log", found=f"a {first.format} without any")
+    return offers
 
 
 def roles_of_table(

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 from syncline_design.logs.log import LogKind
-from syncline_design.logs.log_files import SortedFiles, sorted_files
+from syncline_design.logs.log_files import SortedFiles, some_offers, sorted_files
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.reading import read_log
-from syncline_design.logs.roles import ROLES, Offer, Part, Role, Sureness, offers_of, parts_of
+from syncline_design.logs.roles import ROLES, Offer, Part, Role, Sureness, parts_of
 from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.stream_sources import is_pose_pair, left_of, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
@@ -78,7 +78,7 @@ def proposed(
         if not files.recordings:
             return _of_tables(files, choice, poses, stages)
         run = one_run([one for one in recordings if one.path in files.recordings])
-        return _of_streams(offers_of(run), files, choice, poses)
+        return _of_streams(some_offers(run), files, choice, poses)
     except BadInput as error:
         return _nothing(str(error))
 

@@ -23,6 +23,7 @@ MAGIC = b"\x89MCAP0\r\n"
 FORMAT = "MCAP file"
 MOST_RECORD = 1 << 28
 MESSAGE, CHUNK = 5, 6  # the kind of record
+DEFINING = (3, 4)  # schemas and channels, which stand among the messages of a chunk
 _RECORD = struct.Struct("<BQ")  # kind, length
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK = struct.Struct(
@@ -110,6 +111,10 @@ class McapFile(Container):
             if at > end:
                 raise DamagedError("a record reaches beyond its chunk")
             if kind != MESSAGE:
+                if not kind:
+                    raise DamagedError("a record of no kind")
+                if kind not in DEFINING:  # nothing else belongs here; what is new is passed over
+                    continue
                 for inner in self._of(BytesIO(data[body - _RECORD.size : at]), whole=False):
                     yield from self._one(inner)
                 continue

@@ -50,13 +50,12 @@ class Place:
         """The figure of every message; of an array one row an element."""
         messages, length = block.shape
         kind = np.dtype(self.written)
-        one = self.count is None
-        shape = (messages,) if one else (self.count, messages)
-        strides = (length,) if one else (kind.itemsize, length)
+        shape: tuple[int, ...] = (messages,)
+        strides: tuple[int, ...] = (length,)
+        if self.count is not None:
+            shape, strides = (self.count, messages), (kind.itemsize, length)
         found: NDArray[Any] = np.ndarray(shape, kind, block, self.at, strides)
-        return (
-            found.astype(np.float64) if kind.kind == "f" else found.astype(kind.newbyteorder("="))
-        )
+        return found.astype(np.float64 if kind.kind == "f" else kind.newbyteorder("="))
 
 
 Tree = dict[str, "Place | Tree"]
@@ -75,7 +74,7 @@ class Figures:
         return Figures(place, self._block) if isinstance(place, dict) else place.of(self._block)
 
 
-class Shape:
+class MessageForm:
     """Where the figures of a message stand, and of all that are like it."""
 
     def __init__(

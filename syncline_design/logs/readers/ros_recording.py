@@ -36,6 +36,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 CHECK_EVERY = 8_192  # messages between two looks at the clock
 MOST_CLOUDS = 12  # of a topic, that are unpacked to see when their points were measured
 MOST_TOPICS = 20_000
+LONGEST_NAME = 1_000  # characters of a topic or a type
 RATIO, FREE_BYTES = 200, 1 << 30  # a file may unpack to this many times its size, and this much
 RECORDED = "log time"
 
@@ -183,6 +184,9 @@ class RosRecording:
         channel = message.channel
         if topics >= MOST_TOPICS:
             raise refuse(self.path, "too many topics", expected=f"at most {MOST_TOPICS}")
+        if len(channel.topic) > LONGEST_NAME or len(channel.kind) > LONGEST_NAME:
+            most, found = f"at most {LONGEST_NAME} characters", f"{channel.topic[:40]!r} ..."
+            raise refuse(self.path, "a topic whose name is too long", expected=most, found=found)
         own = stamp_of(channel, self.path)
         known = has_meaning(channel.topic, channel.kind)
         type_ = type_of(channel, self.path) if known else None

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.readers.ros_columns import Shape, UnevenError
+from syncline_design.logs.readers.ros_columns import MessageForm, UnevenError
 from syncline_design.logs.readers.ros_meaning import TopicMeaning
 from syncline_design.logs.readers.ros_types import MessageType, StampOf
 from syncline_design.logs.readers.stream import Piece, StampColumn
@@ -77,7 +77,7 @@ class FiguresOf:
     def __init__(self, meaning: TopicMeaning, type_: MessageType) -> None:
         self._meaning, self._type = meaning, type_
         self._width = len(meaning.columns)
-        self._shapes: list[Shape] = []
+        self._shapes: list[MessageForm] = []
         self._tried = 0
 
     def table(self, messages: list[bytes]) -> Table:
@@ -100,7 +100,7 @@ class FiguresOf:
         return found
 
     def _fill(
-        self, found: Table, messages: list[bytes], likely: NDArray[np.bool_], shape: Shape,
+        self, found: Table, messages: list[bytes], likely: NDArray[np.bool_], shape: MessageForm,
         left: NDArray[np.bool_],
     ) -> None:  # fmt: skip
         """The figures of all messages of a shape among the likely ones, which then are not left."""
@@ -115,18 +115,18 @@ class FiguresOf:
         found[:, places] = self._of(shape, block)
         left[places] = False
 
-    def _of(self, shape: Shape, block: NDArray[np.uint8]) -> Table:
+    def _of(self, shape: MessageForm, block: NDArray[np.uint8]) -> Table:
         with np.errstate(all="ignore"):
             row = self._meaning.row(shape.figures(block))
         return np.array([np.broadcast_to(v, block.shape[:1]) for v in row], dtype=float)
 
-    def _new_shape(self, data: bytes) -> Shape | None:
+    def _new_shape(self, data: bytes) -> MessageForm | None:
         """The shape of a message, if its figures are the same as those unpacked."""
         if self._tried >= MOST_SHAPES:
             return None
         self._tried += 1
         try:
-            shape = Shape(data, self._type.definitions, self._type.kind, self._type.encoding)
+            shape = MessageForm(data, self._type.definitions, self._type.kind, self._type.encoding)
             mine = self._of(shape, np.frombuffer(data, dtype=np.uint8)[None, :])[:, 0]
         except (UnevenError, AttributeError, TypeError, ValueError):
             return None

@@ -46,7 +46,7 @@ PRIMITIVES: Final = {
 }  # fmt: skip
 MOST_FIELDS: Final = 20_000
 MOST_DEPTH: Final = 8
-MOST_STREAMS: Final = 65_536
+MOST_STREAMS: Final = 2_000
 PIECE_ROWS: Final = 20_000
 CHECK_EVERY: Final = 16_384
 MOST_UTC: Final = 100_000  # pairs of boot and UTC that are held
@@ -168,6 +168,9 @@ class ULogRecording:
                     formats[name] = fields
                 elif kind == b"A"[0]:
                     _subscribe(data, formats, topics)
+                    if len(topics) > MOST_STREAMS:
+                        most = f"at most {MOST_STREAMS}"
+                        raise refuse(self.path, "too many topics", expected=most)
                 elif kind == b"O"[0]:
                     self._dropouts += 1
                 elif kind == b"B"[0]:
