@@ -11,7 +11,7 @@ from typing import NamedTuple
 from syncline_design.logs.readers.point_times import CloudTimes, cloud_times
 from syncline_design.logs.readers.reader import library
 from syncline_design.logs.readers.ros_meaning import TopicMeaning, has_meaning, meaning_of
-from syncline_design.logs.readers.ros_rows import PIECE_ROWS, Rows
+from syncline_design.logs.readers.ros_rows import PIECE_ROWS, TopicRows
 from syncline_design.logs.readers.ros_types import (
     BagChannel,
     MessageType,
@@ -197,11 +197,11 @@ class RosRecording:
         self._known[channel.topic, channel.kind] = begun
         return begun
 
-    def _rows(self, message: RawMessage) -> Rows:
-        """Rows of a topic, read as it was listed: its types are compiled once."""
+    def _rows(self, message: RawMessage) -> TopicRows:
+        """TopicRows of a topic, read as it was listed: its types are compiled once."""
         channel = message.channel
         tally = self._known.get((channel.topic, channel.kind)) or self._begun(message, 0)
-        return Rows(tally.own_of, tally.meaning, tally.type_)
+        return TopicRows(tally.own_of, tally.meaning, tally.type_)
 
     def samples(self, name: str) -> Iterator[Piece]:
         if name not in self._channels:
@@ -209,7 +209,7 @@ class RosRecording:
         wanted = self._channels.get(name)
         if wanted is None:
             raise refuse(self.path, f"no stream {name}", found=", ".join(sorted(self._channels)))
-        collected: Rows | None = None
+        collected: TopicRows | None = None
         for message in self._container.of_topics(frozenset({wanted.topic})):
             if message.channel.topic != wanted.topic or message.channel.kind != wanted.kind:
                 continue
@@ -226,8 +226,8 @@ class RosRecording:
         if not self._channels:
             self.streams()
         wanted = {(c.topic, c.kind): n for n, c in self._channels.items() if n in names}
-        rows: dict[str, Rows] = {}
-        of_channel: dict[int, tuple[str, Rows | None]] = {}  # the container keeps its channels
+        rows: dict[str, TopicRows] = {}
+        of_channel: dict[int, tuple[str, TopicRows | None]] = {}  # the container keeps its channels
         for message in self._container.of_topics(frozenset(topic for topic, _ in wanted)):
             channel = message.channel
             known = of_channel.get(id(channel))

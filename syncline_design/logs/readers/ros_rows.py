@@ -21,7 +21,7 @@ MOST_SHAPES: Final = 8  # of a topic's messages; what is of another is unpacked 
 Table = NDArray[np.float64]  # (columns, messages)
 
 
-class Rows:
+class TopicRows:
     """Messages of one topic: their figures together where they are alike; NaN where there are none.
 
     own_of: how a message's own stamp is read; None where only its arrival is known.
