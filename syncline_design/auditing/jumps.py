@@ -8,6 +8,7 @@ sensor's jitter, however short it lasts; one that goes back by the same amount i
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Final
 
@@ -15,8 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.auditing.cadence import LONG_GAP, Cadence, at_another_rate
+from syncline_design.auditing.naming import is_whole, slipped
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Array, Series, in_words, scatter, seconds, spread
+from syncline_design.auditing.series import (
+    NS,
+    Array,
+    Mask,
+    Series,
+    in_words,
+    scatter,
+    seconds,
+    spread,
+)
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
@@ -37,6 +48,7 @@ _GRAINS: Final = 2.2  # of the coarser time: both its values lie on a grid
 _ALONE: Final = 8.0  # times what the intervals around it are off by
 _REPEATED: Final = 0.9  # of an episode's stamps: old messages that are sent again
 _LEAST_S: Final = 2e-5
+_WHOLE_S: Final = 1e-4  # how near to whole seconds a slip of a sensor's pulse is
 _CHANCE: Final = 12.0  # of the delays' spread: so late a queue may make messages
 _QUEUE: Final = 64  # messages, which hardly a queue holds up
 _SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
@@ -89,7 +101,7 @@ def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
         stamp[part] -= round(jump.size_s * NS)
         if jump.end is None:
             stamp[part[-1] + 1 :] -= round(jump.size_s * NS)
-    faults = _faults(found, times)
+    faults = _faults(found, times, pace)
     return Mended(replace(series, stamp=stamp), faults, tuple(found), settling)
 
 
@@ -113,10 +125,9 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
         return []
     width = min(spread(late), spread(late[_APART:] - late[:-_APART]))  # no slow course enters
     floor = max(noise, _SHARE * width)
-    broken = odd[off_here[odd]]
-    first = _sizes(pace, late, odd, broken, (width, floor))
-    return _sizes(pace, late, odd, np.asarray([j.place - 1 for j in first], np.intp),
-                  (width, floor))  # fmt: skip
+    first = _sizes(pace, late, odd, odd[off_here[odd]], off_here, (width, floor))
+    edges = np.asarray([j.place - 1 for j in first], np.intp)
+    return _sizes(pace, late, odd, edges, off_here, (width, floor))
 
 
 def _around(off: Array) -> Array:
@@ -150,9 +161,10 @@ def _level(before: Array, after: Array, width: float, clear_s: float) -> tuple[f
 
 def _sizes(
     pace: Cadence, late: Array, odd: NDArray[np.intp], edges: NDArray[np.intp],
-    limits: tuple[float, float],
+    broken: Mask, limits: tuple[float, float],
 ) -> list[Jump]:  # fmt: skip
-    """The jumps among odd intervals; no level reaches beyond `edges`."""
+    """The jumps among odd intervals; no level reaches beyond `edges`.  broken: intervals that are
+    no whole number of the sensor's."""
     width, floor = limits
     apart = np.abs(pace.interval - pace.steps * pace.period_s)
     uneven = float(np.percentile(apart, 95.0))  # of one interval
@@ -168,14 +180,19 @@ def _sizes(
             continue
         interval = float(pace.interval[k])
         count = max(1, round((interval + moved) / pace.period_s))
+        clear = 3.0 * sure < 0.5 * pace.period_s
+        if not clear and broken[k]:  # the fewest lost messages that delays allow
+            count = max(1, math.ceil((interval + moved - 3.0 * sure) / pace.period_s))
         size = interval - count * pace.period_s
         least = max(floor, _LEVEL * sure, _SLOW * count * pace.period_s)
-        clear = 3.0 * sure < 0.5 * pace.period_s
         alike = _ALIKE * abs(size) + 2.0 * sure
-        if not (clear and abs(size) > least and abs(size + moved) < alike):
+        sized = abs(size) > least and abs(size + moved) < alike
+        if not sized or not (clear or broken[k]):
             continue
         apart_s = abs(size - round(size / pace.period_s) * pace.period_s)
         whole = apart_s <= max(_JITTER * pace.jitter_s, _LEAST_S)
+        if whole and count > round(interval / pace.period_s) >= 1:
+            continue  # receipts jumped where messages are lost: stamps keep their rhythm
         chance = whole and abs(size) < _CHANCE * width
         if not chance or abs(size + _floor(*sides)) < alike:
             found.append(Jump(int(k) + 1, size if uneven < 2.0 * sure else -moved))
@@ -245,7 +262,7 @@ def _replays(jump: Jump, stamp: NDArray[np.int64]) -> bool:
     return float(np.mean(again)) > _REPEATED
 
 
-def _faults(found: list[Jump], times: Array) -> tuple[StampFault, ...]:
+def _faults(found: list[Jump], times: Array, pace: Cadence) -> tuple[StampFault, ...]:
     """One fault a jump; one for all, where a clock is set by about as much at even times."""
     begins = times[[jump.place for jump in found]]
     sizes = np.asarray([jump.size_s for jump in found])
@@ -257,7 +274,7 @@ def _faults(found: list[Jump], times: Array) -> tuple[StampFault, ...]:
         off = float(np.percentile(np.abs(apart - turns * beat), 90.0))
         even = off < _BEAT * beat and float(np.ptp(np.sign(sizes))) == 0.0
     if not even:
-        return tuple(_fault(jump, times) for jump in found)
+        return tuple(_fault(jump, times, pace) for jump in found)
     size, total = float(np.median(sizes)), float(sizes.sum())
     return (StampFault(
         "step", {"seconds": size, "count": float(sizes.size), "interval_s": beat},
@@ -271,9 +288,15 @@ def _signed(size_s: float) -> str:
     return f"{'+' if size_s >= 0 else '-'}{in_words(abs(size_s))}"
 
 
-def _fault(jump: Jump, times: Array) -> StampFault:
+def _fault(jump: Jump, times: Array, pace: Cadence) -> StampFault:
     begin = float(times[jump.place])
     end = float(times[-1] if jump.end is None else times[jump.end])
+    if is_whole(jump.size_s, max(_JITTER * pace.jitter_s, _WHOLE_S)):
+        many = (times.size if jump.end is None else jump.end) - jump.place
+        back = -jump.size_s > pace.period_s or (
+            jump.end is not None and jump.size_s > pace.period_s
+        )
+        return slipped(round(jump.size_s), many, (begin, end), int(back), ends=jump.end is not None)
     lasts = "and stay so" if jump.end is None else f"until {to_digits(end, 4)} s"
     return StampFault(
         "step", {"seconds": jump.size_s}, begin, end,

@@ -8,7 +8,8 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.clock_shapes import Shape, course
-from syncline_design.auditing.result import StampFault
+from syncline_design.auditing.epochs import LARGE_SLIP_S
+from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import Array, in_words
 from syncline_design.model.figure_text import signed, to_digits
 
@@ -88,3 +89,22 @@ def _named(shape: Shape, time_s: Array) -> StampFault:
 
 def _signed(size_s: float) -> str:
     return f"{'+' if size_s >= 0 else '-'}{in_words(abs(size_s))}"
+
+
+def is_whole(size_s: float, exact_s: float) -> bool:
+    """Whether a jump that is known so well is of whole seconds, and of no other epoch."""
+    whole = round(size_s)
+    return 0 < abs(whole) < LARGE_SLIP_S and abs(size_s - whole) < exact_s
+
+
+def slipped(
+    seconds: int, count: int, span_s: tuple[float, float], falls: int, *, ends: bool
+) -> StampFault:
+    """A stretch of so many messages whose stamps are whole seconds off; ends: within the log."""
+    back = Consequence("backward_jump", {"count": float(falls)},
+                       "stamps go back where the slip begins or ends")  # fmt: skip
+    return StampFault(
+        "whole_second_slip", {"seconds": float(seconds), "count": float(count)}, *span_s,
+        f"{count} messages are stamped {abs(seconds)} s {'ahead' if seconds > 0 else 'behind'}"
+        + ("" if ends else ", to the end of the log"), (back,) if falls else (),
+    )  # fmt: skip

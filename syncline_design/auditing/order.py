@@ -16,12 +16,6 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
 WEEK_NS: Final = 604_800 * 10**9
-BACK_NS: Final = 100_000  # no clock is set by less
-LARGE_SET_NS: Final = 5 * 10**8  # told without messages to compare
-MOST_SETS: Final = 20  # times that a clock is set in a log
-FEW_OTHERS: Final = 4  # falls near by: more are messages out of order
-MOST_TRIED: Final = 2000  # falls of receipts that are looked at one by one
-MOST_MOVED: Final = 50  # messages that one may be written too late by
 LONGEST_SPIKE: Final = 5  # messages that go back and return
 LEAST_SLIP: Final = 3  # messages
 MOST_SPIKES: Final = 100_000
@@ -46,7 +40,7 @@ def without_unset(series: Series) -> Repaired:
         zero = empty if series.receive is not None else np.zeros(stamp.size, bool)
         isolated = _runs_of(stamp == 0)
         for begin, end in isolated:
-            if end - begin > 2:
+            if end - begin > 2 or _stands_alone(stamp, begin, end):
                 zero[begin:end] = True
     zero &= ~_passing(stamp, stamp == 0)
     count = int(zero.sum())
@@ -63,12 +57,22 @@ def without_unset(series: Series) -> Repaired:
     return Repaired(replace(series, good=series.good & ~zero), (fault,))
 
 
+def _stands_alone(stamp: NDArray[np.int64], begin: int, end: int) -> bool:
+    """Whether a counter is far from where it begins on both sides of a zero."""
+    if begin == 0 or end >= stamp.size:
+        return False
+    usual = float(np.median(np.abs(np.diff(stamp))))
+    return min(int(stamp[begin - 1]), int(stamp[end])) > 5.0 * usual
+
+
 def _passing(stamp: NDArray[np.int64], zero: Mask) -> Mask:
-    """Zeros of a counter that begins anew: the stamp after is the next small count."""
+    """Zeros of a counter that begins anew: the stamp after is the next small count, the one before
+    of the turn before."""
     usual = float(np.median(np.abs(np.diff(stamp)))) if stamp.size > 1 else 0.0
     out = np.zeros(stamp.size, bool)
     for begin, end in _runs_of(zero):
-        if end - begin == 1 and end < stamp.size and 0 < stamp[end] < 5 * usual:
+        anew = begin == 0 or stamp[begin - 1] > 5 * usual
+        if anew and end - begin == 1 and end < stamp.size and 0 < stamp[end] < 2 * usual:
             out[begin] = True
     return out
 
@@ -76,136 +80,6 @@ def _passing(stamp: NDArray[np.int64], zero: Mask) -> Mask:
 def _runs_of(mask: Mask) -> Iterator[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return ((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
-
-
-def in_order_of_receipt(series: Series) -> Series:
-    """Messages that were written out of order, with both their times, put in order again."""
-    if series.receive is None or not np.any(np.diff(series.receive) < 0):
-        return series
-    known = np.where(series.receive == UNSET, np.maximum.accumulate(series.receive), series.receive)
-    order = np.argsort(known, kind="stable")
-    before, after = (
-        _falls(series.stamp[series.good]),
-        _falls(series.stamp[order][series.good[order]]),
-    )
-    if after >= before or _largest_move(order) > MOST_MOVED:
-        return series
-    return replace(series, stamp=series.stamp[order], receive=series.receive[order],
-                   good=series.good[order])  # fmt: skip
-
-
-def _falls(stamp: NDArray[np.int64]) -> int:
-    return int(np.sum(np.diff(stamp) < 0))
-
-
-def _largest_move(order: NDArray[np.intp]) -> int:
-    return int(np.max(np.abs(order - np.arange(order.size))))
-
-
-def with_receipts_forward(series: Series) -> Repaired:
-    """Receipts that go back.
-
-    Where all later ones stay back the recorder's clock was set.  Else some were noted out of order,
-    as several threads do: no fault, they count as received no earlier than the one before.
-    """
-    if series.receive is None or series.receive.size < 3:
-        return Repaired(series)
-    change = np.diff(series.receive)
-    falls = np.flatnonzero((change < 0) & series.good[1:] & series.good[:-1])
-    if not falls.size:
-        return Repaired(series)
-    moved, faults = _sets(series, change, falls) if falls.size <= MOST_TRIED else (0, [])
-    put_back = replace(series, receive=series.receive + moved)
-    return Repaired(_without_disorder(put_back), tuple(faults))
-
-
-def _sets(
-    series: Series, change: NDArray[np.int64], falls: NDArray[np.intp]
-) -> tuple[NDArray[np.int64], list[StampFault]]:
-    """By how much receipts are behind after their clock was set back, and each time it was."""
-    usual = int(np.median(change))
-    moved = np.zeros(series.stamp.size, np.int64)
-    faults: list[StampFault] = []
-    times = series.seconds
-    for fall in falls[change[falls] < -BACK_NS]:
-        size = _set_back(series, int(fall), usual - int(change[fall]))
-        if size is None or len(faults) >= MOST_SETS:
-            continue
-        moved[fall + 1 :] += size
-        faults.append(StampFault(
-            "recorder_clock", {"seconds": size / NS, "kind": "step"}, float(times[fall]),
-            float(times[-1]),
-            f"receipts go back by {in_words(-int(change[fall]) / NS)} and stay behind: the "
-            "recorder's clock was set",
-        ))  # fmt: skip
-    return moved, faults
-
-
-def _set_back(series: Series, fall: int, about: int) -> int | None:
-    """By how much [ns], as messages before and after differ in lateness; None where it passes.
-
-    about: the fall itself and the usual interval; single delays are in it.
-    """
-    assert series.receive is not None
-    late = series.receive - series.stamp
-    sizes = []
-    for around in (60, 300):
-        low, high = max(0, fall - around + 1), fall + 1 + around
-        before = late[low : fall + 1][series.good[low : fall + 1]]
-        after = late[fall + 1 : high][series.good[fall + 1 : high]]
-        if min(before.size, after.size) < 4:
-            return about if about > LARGE_SET_NS else None
-        scattered = max(spread(before.astype(np.float64)), spread(after.astype(np.float64)))
-        size = float(np.median(before) - np.median(after))
-        if size > 2.0 * about + 4.0 * scattered:  # more than receipts fall by: the stamps' own
-            return None
-        sure = 5.0 * scattered / np.sqrt(min(before.size, after.size))
-        if size < max(0.5 * about - scattered, sure, 0.2 * about):
-            return None
-        sizes.append(size)
-    return round(sizes[0]) if _by_count(series, fall, sizes[0]) else None
-
-
-def _by_count(series: Series, fall: int, size: float) -> bool:
-    """Whether receipts alone are behind by so much [ns], against the count of messages.
-
-    It tells a recorder's clock from stamps that jump while receipts come out of order.  Messages
-    that come too unevenly for it count where receipts fall nowhere else near by.
-    """
-    assert series.receive is not None
-    receive = series.receive
-    lag = min(60, receive.size // 2)
-    usual = float(np.median((receive[lag:] - receive[:-lag]) / lag))
-    low, high = max(0, fall - 59), min(receive.size, fall + 61)
-    apart = (receive[low:high] - receive[fall]) - usual * np.arange(low - fall, high - fall)
-    before, after = apart[: fall + 1 - low], apart[fall + 1 - low :]
-    if max(spread(before), spread(after)) < 0.3 * size:
-        return float(np.median(before) - np.median(after)) > 0.5 * size
-    others = int(np.sum(np.diff(receive[low:high]) < -BACK_NS)) - 1
-    return others < FEW_OTHERS
-
-
-def _without_disorder(series: Series) -> Series:
-    """Receipts that never fall; a message that would have come before all others of its time,
-    measured by how late it is, is left out."""
-    assert series.receive is not None
-    places = series.places()
-    receive = series.receive[places]
-    falls = np.flatnonzero(np.diff(receive) < 0)
-    if not falls.size:
-        return series
-    late = receive - series.stamp[places]
-    good = series.good.copy()
-    for fall in falls[:MOST_SPIKES]:
-        around = np.concatenate([late[max(0, fall - 60) : fall], late[fall + 2 : fall + 61]])
-        if around.size >= 8:
-            low, middle = np.percentile(around, [5.0, 50.0])
-            if late[fall + 1] < low - (middle - low):
-                good[places[fall + 1]] = False
-    whole = series.receive.copy()
-    left = np.flatnonzero(good)
-    whole[left] = np.maximum.accumulate(whole[left])
-    return replace(series, receive=whole, good=good)
 
 
 def without_duplicates(series: Series) -> Repaired:
@@ -268,6 +142,24 @@ def without_spikes(series: Series) -> Repaired:
         "backward_jump", {"count": float(count), "seconds": deepest / NS}, float(times[0]),
         float(times[-1]), f"{count} times a stamp lies before the one of the message before, by "
         f"up to {to_digits(-deepest / NS, 6)} s, and the next go on as if nothing were",
+    )  # fmt: skip
+    return Repaired(replace(series, good=good), (fault,))
+
+
+def without_wrong(series: Series, wrong: Mask) -> Repaired:
+    """Single stamps that a sensor's rhythm has no place for, among messages in another order."""
+    out = series.good & wrong
+    if series.receive is None or not out.any():
+        return Repaired(series)
+    late = seconds(series.receive - series.stamp)
+    away = late - float(np.median(late[series.good]))
+    times, count = series.seconds[out], int(out.sum())
+    good = series.good & ~wrong
+    slip = _slips(away[out], late[good], count, times)
+    fault = slip or StampFault(
+        "backward_jump", {"count": float(count), "seconds": -float(away[out].max())},
+        float(times[0]), float(times[-1]), f"{count} stamps lie where the sensor did not measure, "
+        f"by up to {in_words(float(away[out].max()))} before the others of their time",
     )  # fmt: skip
     return Repaired(replace(series, good=good), (fault,))
 

@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.cadence import Cadence, cadence
-from syncline_design.auditing.result import Consequence, StampFault
+from syncline_design.auditing.naming import slipped
+from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds, spread
 from syncline_design.auditing.shifts import Shift, Shifts
 from syncline_design.auditing.witness import Side
-from syncline_design.model.figure_text import to_places
 
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip
@@ -131,16 +131,7 @@ def _side_of(
 
 def _slip(times: Array, turns: Array, run: tuple[int, int], stamp: np.ndarray) -> StampFault:
     begin, end = run
-    size = -float(turns[begin])
     ends = end < times.size
     change = np.diff(stamp[max(0, begin - 1) : end + 1])
-    falls = int(np.sum(change < 0))
-    back = Consequence("backward_jump", {"count": float(falls)},
-                       "stamps go back where the slip begins or ends")  # fmt: skip
-    return StampFault(
-        "whole_second_slip", {"seconds": size, "count": float(end - begin)}, float(times[begin]),
-        float(times[end] if ends else times[-1]),
-        f"{end - begin} messages are stamped {to_places(abs(size), 0)} s "
-        f"{'ahead' if size > 0 else 'behind'}" + ("" if ends else ", to the end of the log"),
-        (back,) if falls else (),
-    )  # fmt: skip
+    span = float(times[begin]), float(times[end] if ends else times[-1])
+    return slipped(-round(turns[begin]), end - begin, span, int(np.sum(change < 0)), ends=ends)

@@ -24,6 +24,7 @@ from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
 from syncline_design.auditing.late_scatter import waits_of
 from syncline_design.auditing.levels import smallest
+from syncline_design.auditing.receipts import in_order_of_receipt, with_receipts_forward
 from syncline_design.auditing.result import (
     Consequence,
     EnvelopePoint,
@@ -82,15 +83,16 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     in_force().check()
     stamps = stream.stamps
     assert stamps is not None
-    raw = order.in_order_of_receipt(series_of(stamps.primary_ns, _receipts(stamps), start))
+    raw = in_order_of_receipt(series_of(stamps.primary_ns, _receipts(stamps), start))
     found: list[StampFault] = []
-    series, unit, step_ns = _ordered(raw, found, stamps.primary_factor)
+    series, unit, step_ns = _in_one_unit(raw, found, stamps.primary_factor)
     disorder = disorder_of(series)
     series = disorder.put(series)
     if disorder.fault is None:
         raw = disorder.put(raw)
     else:
         found.append(disorder.fault)
+    series = _continuous(series, disorder, found)
     grain = _grain(series, step_ns, found)
     part = None if grain else arrival.arrived_in_part(series, cadence(series))
     arrived = None if grain or part else arrival.stamped_on_arrival(series, cadence(series))
@@ -117,9 +119,9 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         known = known_offset(base, slips.series, False)
     least = max(_coarse(raw), step_ns / NS, grain.size_s if grain is not None else 0.0)
     moved = without_shifts(slips.series, least_s=least)
-    found = _with_jumps(found, [*slips.faults, *moved.faults])
     series = moved.series
     pace = cadence(series)
+    found = _with_jumps(found, [*slips.faults, *moved.faults], pace.period_s)
     _last(series, pace, stream, known, grain, found)
     found = [f for f in found if not _at_edges(f, disorder)]
     whole = _summed(stream, raw, series, pace, found, (slips, moved), known)
@@ -144,18 +146,32 @@ def is_receipt(name: str | None) -> bool:
     return name is not None and name.replace("_", " ").lower().startswith(RECEIVED)
 
 
-def _ordered(
+def _in_one_unit(
     raw: Series, found: list[StampFault], factor: float
 ) -> tuple[Series, StampFault | None, float]:
-    """Unset stamps left out, one unit, counters continuous."""
+    """Unset stamps left out, receipts of a clock that was set put forward, one unit."""
     series = _take(order.without_unset(raw), found)
-    series = _take(order.with_receipts_forward(series), found)
+    series = _take(with_receipts_forward(series), found)
     unit = in_one_unit(series, factor)
     if unit.fault is not None:
         found.append(unit.fault)
-    whole = unwrapped(unit.series)
+    return unit.series, unit.fault, unit.step_ns
+
+
+def _continuous(series: Series, disorder: Disorder, found: list[StampFault]) -> Series:
+    """Counters made continuous; a wrong stamp among them counts no turn and takes that of the
+    message before it."""
+    whole = unwrapped(disorder.without_wrong(series))
     found += whole.faults
-    return whole.series, unit.fault, unit.step_ns
+    places = whole.series.places()
+    if not places.size:
+        return series
+    before = np.searchsorted(places, np.arange(series.stamp.size), "right") - 1
+    turned = (whole.series.stamp - series.stamp)[places[np.maximum(before, 0)]]
+    mended = replace(series, stamp=np.where(series.good, series.stamp + turned, series.stamp))
+    if disorder.order is None or disorder.wrong is None:
+        return mended  # in their place, where they show by themselves
+    return _take(order.without_wrong(mended, disorder.wrong), found)
 
 
 def _take(repaired: order.Repaired, found: list[StampFault]) -> Series:
@@ -199,10 +215,15 @@ def _with_alike(series: Series, arrived: StampFault) -> StampFault:
     return replace(arrived, consequences=follows)
 
 
-def _with_jumps(found: list[StampFault], jumps: list[StampFault]) -> list[StampFault]:
-    """Shifts beside what was found; a stamp that comes twice where one ends is its consequence."""
+def _with_jumps(
+    found: list[StampFault], jumps: list[StampFault], period_s: float
+) -> list[StampFault]:
+    """Shifts beside what was found; a stamp that comes twice where one sets stamps back by an
+    interval is its consequence."""
     twice = [f for f in found if f.fault == "duplicates"]
-    edges = [e for f in jumps for e in (f.from_s, f.to_s) if e is not None]
+    back = [(f.from_s, float(f.parameters.get("seconds", 0.0))) for f in jumps]
+    back += [(f.to_s, -size) for f, (_, size) in zip(jumps, back, strict=True)]
+    edges = [at for at, size in back if at is not None and abs(size + period_s) < 0.5 * period_s]
     if not twice or not edges or float(twice[0].parameters["count"]) > len(edges):
         return [*found, *jumps]
     near = [min(abs(e - at) for e in edges) for at in (twice[0].from_s, twice[0].to_s)
