@@ -12,10 +12,16 @@ import pytest
 from study_specs import SPEC
 from syncline_design.comparison import diff as comparison_diff
 from syncline_design.comparison.diff import diff
-from syncline_design.comparison.diff_result import SCHEMA, Diff
+from syncline_design.comparison.diff_result import SCHEMA, Cause, Diff
 from syncline_design.machine.records import read_as, schema_of
 from syncline_design.report.json_out import json_text
-from syncline_design.report.on_diff import DIFF_FORMATS, headline, on_diff, render_diff
+from syncline_design.report.on_diff import (
+    DIFF_FORMATS,
+    cause_words,
+    headline,
+    on_diff,
+    render_diff,
+)
 from syncline_design.report.render_console import console
 from syncline_design.spec.files import Collection
 from syncline_design.spec.load import BadInput
@@ -406,3 +412,42 @@ def test_the_catalogs_are_read_once_for_each_file(
     monkeypatch.setattr(comparison_diff, "catalogs_of", counted)
     assert len(diff(*files, PLAIN).causes) == 2
     assert read == list(files)
+
+
+WORDS = {
+    "of a list what came and what went": (
+        ("stages[uav].ranging.candidates", '["a", "b"]', '["b", "c", "d"]'),
+        "stages[uav].ranging.candidates: c, d added and a removed",
+    ),
+    "of a list in another order both": (("x", '["a", "b"]', '["b", "a"]'), "x a, b to b, a"),
+    "no list": (("x", '["a"]', "[]"), "x: a removed"),
+    "a stage": (
+        (
+            "stages[auv]", None,
+            '{"name": "auv", "platform": {"use": "auv", "distance": "6 m"}, '
+            '"ranging": {"candidates": ["m3", "r2"], "per_mission": true}}',
+        ),
+        "stages[auv] added (name auv, platform (use auv, distance 6 m), "
+        "ranging (candidates [m3, r2], per_mission yes))",
+    ),
+    "digits as they are written": (
+        ("requirements[A]", '{"id": "A", "kind": "mass", "limit": 0.50}', None),
+        "requirements[A] removed (kind mass, limit 0.50)",
+    ),
+    "a text": (("x", "100 m", "60 m"), "x 100 m to 60 m"),
+    "a mapping": (("x", '{"a": 1.0, "b": null}', "y"), "x a 1.0, b none to y"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("cause", "words"), WORDS.values(), ids=WORDS.keys())
+def test_mappings_and_lists_are_said_in_words(
+    cause: tuple[str, str | None, str | None], words: str
+) -> None:
+    assert cause_words(Cause(*cause)) == words
+
+
+def test_a_longer_list_of_candidates_is_no_json(files: tuple[Path, Path]) -> None:
+    change(files[0], ("[hardware, gpio]", "[hardware]"))
+    told = headline(diff(*files, PLAIN))
+    assert "gpio added" in told
+    assert "[" not in told.replace("stages[uav]", "")

@@ -341,3 +341,15 @@ def test_no_more_intervals_than_can_be_looked_at(tmp_path: Path) -> None:
     raw["stages"] = [one, *[later] * 4]
     with pytest.raises(BadInput, match=r"stages\[4\]\.distance: too many intervals"):
         load_text(written(raw, tmp_path), tmp_path / "spec.yaml")
+
+
+def test_an_interval_inside_the_platform_is_sent_to_the_stage(tmp_path: Path) -> None:
+    text = SPEC.replace("    distance: 10 m .. 60 m\n", "")
+    text = text.replace("baseline: 0 m}", "baseline: 0 m, distance: 10 m .. 60 m}")
+    with pytest.raises(BadInput) as refused:
+        load_text(text, tmp_path / "s.yaml")
+    (problem,) = refused.value.problems
+    assert problem.path == "stages[0].platform.distance"
+    assert problem.found == "10 m .. 60 m"
+    assert "key of the stage" in problem.hint
+    assert "distance: NEAR .. FAR" in problem.hint

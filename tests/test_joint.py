@@ -190,6 +190,17 @@ def together(folder: Path, order: tuple[int, ...], *more: str) -> dict:
     return dict(json.loads(out.read_text("utf-8")))
 
 
+def _each_log_agrees(found: dict) -> None:
+    """What each log tells alone, weighted by its variance, is what all of them tell together."""
+    own = [one["parameters"]["latency_s"] for one in found["each_log"]]
+    assert sorted(one["log"] for one in found["each_log"]) == [1, 2, 3]
+    weights = np.array([one["standard_uncertainty"] ** -2 for one in own])
+    mean = float(weights @ [one["value"] for one in own] / weights.sum())
+    common = found["parameters"]["latency_s"]
+    assert abs(mean - common["value"]) < 0.3 * common["standard_uncertainty"]
+    assert min(one["standard_uncertainty"] for one in own) > common["standard_uncertainty"]
+
+
 def test_weak_logs_name_together_what_none_names_alone(weak: Path, stored: Path) -> None:
     """And adding the third later is the same as all at once, in any order."""
     once = together(weak, (2, 0, 1))
@@ -207,6 +218,7 @@ def test_weak_logs_name_together_what_none_names_alone(weak: Path, stored: Path)
             "build",
         )
         assert "per_log" not in found
+        _each_log_agrees(found)
         low, high = found["parameters"]["latency_s"]["interval95"]
         assert low < truth < high
     one, other = (d["findings"][0] for d in (once, later))

@@ -10,7 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from syncline_design.model.figure_text import percent, rounded, signed, to_digits, to_places
+from syncline_design.model.figure_text import (
+    format_nats,
+    percent,
+    rounded,
+    signed,
+    to_digits,
+    to_places,
+)
 from syncline_design.report import numbers
 
 PACKAGE = Path(__file__).parent.parent / "syncline_design"
@@ -110,3 +117,18 @@ def test_what_is_no_number_is_said(text) -> None:  # type: ignore[no-untyped-def
 )  # fmt: skip
 def test_money_has_one_format(amount: float, text: str) -> None:
     assert numbers.money(amount, "EUR") == text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [(13436.04, None, "13 436.0 nat"), (15.46, None, "15.5 nat"), (160_100.0, 3, "160 000 nat"),
+     (0.0, 3, "0 nat"), (19.27, 3, "19.3 nat"), (math.inf, 3, "unlimited nat"),
+     (1.5e12, 3, "1.5e+12 nat")],
+)  # fmt: skip
+def test_nats_have_their_thousands_apart(value: float, digits: int | None, text: str) -> None:
+    assert format_nats(value, digits) == text
+
+
+def test_no_line_ends_inside_a_figure_of_nats() -> None:
+    told = numbers.unbroken("saves 13 436.0 nat; 3 000 rows, 2026 100 was 12 of 1000")
+    assert told.replace("\u00a0", "_") == "saves 13_436.0_nat; 3_000 rows, 2026_100 was 12 of 1000"

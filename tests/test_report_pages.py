@@ -152,7 +152,7 @@ def diagnosed() -> Page:
         "missing values",
         "283\u00a0mm",
         "along, speed 6.2\u00a0m/s to 9\u00a0m/s: mean \u221265.2\u00a0cm, 508 standard errors",
-        "Told apart on this log from filter lag (position), 141 nat worse",
+        "Told apart on this log from filter lag (position), 141\u00a0nat worse",
         "boresight: the vehicle never tilted",
         "after, plus a placebo: boresight (ranging)",
         "held-out regime (speed above 7 m/s), after",
@@ -257,7 +257,7 @@ def test_a_page_says_fits_worse_only_of_what_does() -> None:
     )
     data = diagnosis(findings=(replace(LATENCY, lookalikes=alike),))
     page = " ".join(Page(html(on_diagnosis(data))).text.split())
-    plain = re.sub(r"\\(.)", r"\1", markdown(on_diagnosis(data)))
+    plain = re.sub(r"\\(.)", r"\1", markdown(on_diagnosis(data))).replace("\u00a0", " ")
     for text in (page, plain):
         assert "fits worse" not in text
         assert "157 nat better, but this log does not scatter as it would have to" in text

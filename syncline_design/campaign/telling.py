@@ -10,7 +10,7 @@ import numpy as np
 
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
-from syncline_design.campaign.pool import Pool, Scoped, Term, fitted
+from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import Weights, promise_of
@@ -129,11 +129,11 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
         (aliases, (), ()), material, size_m,
     )  # fmt: skip
     scope = one.scoped.scope
-    per_log = None if scope == "build" else tuple(_per_log(told, k))
     tested = one.tested.logs if one.tested.starts is None else one.tested.starts
-    found = replace(found, scope=scope, per_log=per_log, one_value=tested)
+    found = replace(found, scope=scope, one_value=tested)
     if scope == "build":
-        return found
+        return replace(found, each_log=tuple(_per_log(told, _apart(told, k), k)))
+    found = replace(found, per_log=tuple(_per_log(told, told.named.fit, k)))
     every = "at every start" if scope == "start" else "in every log"
     return replace(found, sentence=f"{found.sentence} on average, another value {every}")
 
@@ -162,9 +162,15 @@ def _estimates(term: Term, judged: Judged) -> dict[str, Estimate]:
     return found
 
 
-def _per_log(told: Told, k: int) -> Iterator[PerLog]:
+def _apart(told: Told, k: int) -> Fitted:
+    """All effects fitted anew, one of them with a value of its own in every log."""
+    scoped = list(told.named.fit.scoped)
+    scoped[k] = replace(scoped[k], scope="log")
+    return fitted(told.pool, scoped)
+
+
+def _per_log(told: Told, fit: Fitted, k: int) -> Iterator[PerLog]:
     """The values of an effect in every log."""
-    fit = told.named.fit
     one = fit.scoped[k]
     group = told.pool.group_of(one.scope)
     for run, entry in enumerate(told.entries):

@@ -202,7 +202,7 @@ def horizon_words(horizon: MissionHorizon, *, given: bool) -> str:
     duration = format_duration(horizon.duration_s)
     extent = format_quantity(horizon.extent_m, Dimension.LENGTH)
     tilt = format_quantity(horizon.tilt_rad, Dimension.ANGLE)
-    whose = "the spec's" if given else "by default; `horizon:` in the spec changes it"
+    whose = "the spec's" if given else "by default; horizon in the spec changes it"
     return (
         f"Horizon: {duration}, {extent} about the origin, tilt up to {tilt} ({whose}). "
         "What drifts or grows with distance is charged for all of it."

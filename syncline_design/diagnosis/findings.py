@@ -33,7 +33,7 @@ from syncline_design.diagnosis.unlike_readings import Unlike, factor_effect
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
-from syncline_design.model.figure_text import format_estimate, to_places
+from syncline_design.model.figure_text import format_estimate, format_nats, to_places
 from syncline_design.model.known import EffectEntry
 
 Label = tuple[str, str, int]
@@ -106,7 +106,7 @@ def evidence_words(gain: float, log10_p: float | None) -> str:
         power = math.floor(log10_p)
         digit = round(10.0 ** (log10_p - power))
         chance = f"{digit}e{power:03d}" if digit < 10 else f"1e{power + 1:03d}"
-    return f"saves {to_places(gain, 1)} nat; noise alone does that with a chance of {chance}"
+    return f"saves {format_nats(gain)}; noise alone does that with a chance of {chance}"
 
 
 def is_noise(effect: Effect) -> bool:
@@ -155,7 +155,7 @@ def _undone(one: Finding, other: Label | None) -> Finding:
 
 
 def _without_chance(one: Finding) -> Finding:
-    words = f"leaving it out costs {to_places(one.gain_nat, 1)} nat"
+    words = f"leaving it out costs {format_nats(one.gain_nat)}"
     return replace(one, evidence=words, log10_p=None)
 
 
@@ -365,7 +365,7 @@ def _tails(final: Settled, opened: Opened, weights: Weights) -> list[Finding]:
     }
     values = ((wider.parameters[0].name, tails.scale),)
     material = weights.material(core_m, EffectEntry(wider.name, label[1], stage, values))
-    words = f"a core as wide as the spec's costs {to_places(tails.wider, 1)} nat"
+    words = f"a core as wide as the spec's costs {format_nats(tails.wider)}"
     size_m = math.sqrt(max(size_m**2 - core_m**2, 0.0))
     return [
         _finding(final, effect, label, shown, size_m, weights),
@@ -388,7 +388,7 @@ def episode_finding(data: Data, one: Episode, weights: Weights) -> Finding:
     stage, sensor = one.sensor
     values = tuple((name, e.value) for name, e in shown.items())
     material = weights.material(size_m, EffectEntry(effect.name, sensor, stage, values))
-    words = f"saves {to_places(one.gain, 1)} nat in its part of the log"
+    words = f"saves {format_nats(one.gain)} in its part of the log"
     found = finding(effect, sensor, stage, shown, words, one.gain, None,
                     material=material, size_m=size_m)  # fmt: skip
     return replace(found, from_s=one.from_s, to_s=one.to_s)
@@ -416,7 +416,7 @@ def _unlike_finding(effect: Effect, final: Settled, one: Unlike, weights: Weight
     size_m = math.sqrt(max(more, 0.0))
     stage, sensor = one.sensor
     entry = EffectEntry(effect.name, sensor, stage, ((name, factor),))
-    words = f"saves {to_places(one.gain, 1)} nat beside one size for all readings of the sensor"
+    words = f"saves {format_nats(one.gain)} beside one size for all readings of the sensor"
     told = finding(effect, sensor, stage, shown, words, one.gain, None,
                    material=weights.material(size_m, entry), size_m=size_m)  # fmt: skip
     times = {name: level.factor[index] * own for name, own in one.of_each.items()}

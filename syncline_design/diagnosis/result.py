@@ -125,8 +125,9 @@ class Finding(Record):
     from_s, to_s: the stamps between which it acts, where it does so in a part of the log alone.
     readings: of a sensor's noise, deviations over the spec's by reading, where they are unlike.
     scope: of several logs together, whether it is one value in all (build), one a start of the
-    system, or one a log; per_log: its values where it is not one.  one_value: chance by which the
-    logs would differ so much if it were one.
+    system, or one a log; per_log: its values where it is not one.  each_log: what every log by
+    itself tells of one that is one value.  one_value: chance by which the logs would differ so much
+    if it were one.
     """
 
     effect: str
@@ -156,6 +157,7 @@ class Finding(Record):
     scope: Scope | None = optional()
     per_log: tuple[PerLog, ...] | None = optional()
     one_value: float | None = optional()
+    each_log: tuple[PerLog, ...] | None = optional()
     readings: Mapping[str, float] | None = optional()
 
     @property

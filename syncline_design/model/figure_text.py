@@ -135,6 +135,15 @@ def to_places(value: float, places: int, sign: bool = False) -> str:
     return f"{value:{'+' if sign else ''}z.{places}f}"  # z: what rounds to zero has no sign
 
 
+def format_nats(nats: float, digits: int | None = None) -> str:
+    """`13 436.0 nat`: thousands grouped; one decimal, or so many significant figures."""
+    text = to_places(nats, 1) if digits is None else to_digits(nats, digits)
+    whole, point, rest = text.partition(".")
+    if whole.isdigit():
+        whole = f"{int(whole):,}".replace(",", " ")
+    return f"{whole}{point}{rest} nat"
+
+
 def percent(share: float, digits: int = 3) -> str:
     """0.124 as `12.4 %`."""
     return f"{to_digits(100.0 * share, digits)} %"

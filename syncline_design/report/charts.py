@@ -118,7 +118,7 @@ def _asymptotes(axes: Axes, curve: SynclineCurve, low: float, high: float) -> No
     }
     axes.plot([left, right], [roof, roof], **dashes)
     axes.annotate(
-        f"roof {numbers.length(curve.floor_m, 3)}",
+        f"roof {numbers.error(curve.floor_m, curve.limit, 3)}",
         (left, roof),
         xytext=(6, 4),
         textcoords="offset points",
@@ -190,7 +190,8 @@ def _syncline_labels(axes: Axes) -> None:
 def _describe(curve: SynclineCurve) -> str:
     parts = [
         "Accuracy against synchronisation accuracy on logarithmic axes.",
-        f"Roof at {numbers.length(curve.floor_m)} of error, slope {numbers.speed(curve.rate_mps)}.",
+        f"Roof at {numbers.error(curve.floor_m, curve.limit)} of error, "
+        f"slope {numbers.speed(curve.rate_mps)}.",
     ]
     if curve.tau_crit_s:
         parts.append(f"They meet at tau_crit {numbers.time(curve.tau_crit_s)}.")
@@ -283,7 +284,7 @@ def ledger(
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        _waterfall(axes, terms, total, numbers.error(total, limit))
+        _waterfall(axes, terms, total, limit)
         axes.set_ylim(len(terms) + 0.6, -0.6)
         axes.set_xlim(0, 1.04 * max(total, 0.0 if limit is None else limit.limit) or 1.0)
         if limit is not None:
@@ -294,7 +295,7 @@ def ledger(
         _length_ticks(axes, limit)
         scales.grid(axes, "x")
 
-    spoken = "; ".join(f"{t.label} {numbers.length(t.value_m)}" for t in terms)
+    spoken = "; ".join(f"{t.label} {numbers.error(t.value_m, limit)}" for t in terms)
     spoken += f"; total {numbers.error(total, limit)}"
     if limit is not None:
         spoken += f"; limit {numbers.limit(limit)}"
@@ -302,9 +303,11 @@ def ledger(
     return draw(name, "Terms that add up to the total error", spoken, size, build)
 
 
-def _waterfall(axes: Axes, terms: Sequence[LedgerBar], total: float, said: str) -> None:
+def _waterfall(
+    axes: Axes, terms: Sequence[LedgerBar], total: float, limit: numbers.Limited | None
+) -> None:
     """Each term's bar starts where the one before ends; the last bar is the total."""
-    start = 0.0
+    start, said = 0.0, numbers.error(total, limit)
     for row, term in enumerate(terms):
         colour = {"sensor": SERIES[0], "sync": SERIES[1]}.get(term.kind, SERIES[3])
         axes.barh(
@@ -312,13 +315,13 @@ def _waterfall(axes: Axes, terms: Sequence[LedgerBar], total: float, said: str) 
             linewidth=0.8, hatch=_HATCH.get(term.kind, ""), zorder=3,
         )  # fmt: skip
         start += term.value_m
-        beside(axes, row, numbers.length(term.value_m, 3))
+        beside(axes, row, numbers.error(term.value_m, limit, 3))
         share = numbers.percent(term.value_m / total) if total else numbers.MISSING
         tell(
             axes,
             (start - term.value_m, start),
             (row - 0.31, row + 0.31),
-            [("Term", term.label), ("Error", numbers.length(term.value_m)), ("Share", share)],
+            [("Term", term.label), ("Error", numbers.error(term.value_m, limit)), ("Share", share)],
         )
     axes.barh(len(terms), total, height=0.62, color=INK, zorder=3)
     beside(axes, len(terms), said)

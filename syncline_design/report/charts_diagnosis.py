@@ -85,42 +85,50 @@ class Step:
 def gap_staircase(
     steps: Sequence[Step], floor_m: float | None, name: str = "fig-gap"
 ) -> InlineChart:
-    """RMS on held-out data as effects are added, down to the floor of the spec's own noise."""
+    """RMS on held-out data as effects are added, down to the floor of the spec's own noise.
+
+    All in the unit that the largest is told in.
+    """
+    largest = max([floor_m or 0.0, *(step.rms_m for step in steps)])
+    unit = numbers.with_uncertainty(largest, None, "m")
+
+    def shown(value_m: float, digits: int = 4) -> str:
+        return numbers.like(unit, value_m, digits)
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         for row, step in enumerate(steps):
             axes.barh(row, step.rms_m, height=0.6, color=SERIES[0] if row else MUTED, zorder=3)
-            beside(axes, row, numbers.length(step.rms_m, 3))
+            beside(axes, row, shown(step.rms_m, 3))
             tell(
                 axes,
                 (0.0, step.rms_m),
                 (row - 0.3, row + 0.3),
-                [("After", step.label), ("RMS held out", numbers.length(step.rms_m))],
+                [("After", step.label), ("RMS held out", shown(step.rms_m))],
             )
-        axes.set_xlim(0, 1.05 * max([floor_m or 0.0, *(step.rms_m for step in steps)]) or 1.0)
+        axes.set_xlim(0, 1.05 * largest or 1.0)
         if floor_m:
-            _mark_floor(axes, floor_m)
+            _mark_floor(axes, floor_m, shown(floor_m, 3))
         axes.set_ylim(len(steps) - 0.4, -0.6)
         labels = [shortened(step.label, 30) for step in steps]
         scales.set_ticks(axes, "y", range(len(labels)), lambda row: labels[int(row)])
         scales.hide_ticks(axes, "y")
         scales.set_ticks(axes, "x", _linear(axes.get_xlim()[1]),
-                         lambda v: "0" if v == 0 else scales.short_length(v), 150.0)  # fmt: skip
+                         lambda v: "0" if v == 0 else shown(v, 3), 150.0)  # fmt: skip
         scales.grid(axes, "x")
         axes.set_xlabel("RMS of the residual on held-out data")
 
-    spoken = "; ".join(f"{step.label}: {numbers.length(step.rms_m)}" for step in steps)
+    spoken = "; ".join(f"{step.label}: {shown(step.rms_m)}" for step in steps)
     if floor_m:
-        spoken += f"; floor {numbers.length(floor_m)}"
+        spoken += f"; floor {shown(floor_m)}"
     size = (WIDTH, 76.0 + 26.0 * len(steps))
     return draw(name, "Gap on held-out data, step by step", spoken, size, build)
 
 
-def _mark_floor(axes: Axes, floor_m: float) -> None:
+def _mark_floor(axes: Axes, floor_m: float, said: str) -> None:
     axes.axvline(floor_m, color=SERIES[2], linewidth=1.6, linestyle=(0, (5, 3)), zorder=4)
     axes.annotate(
-        f"floor {numbers.length(floor_m, 3)}", (floor_m, 1.0), xycoords=("data", "axes fraction"),
+        f"floor {said}", (floor_m, 1.0), xycoords=("data", "axes fraction"),
         xytext=(0, 2), textcoords="offset points", va="bottom", ha="center", color=SERIES[2],
         annotation_clip=False,
     )  # fmt: skip

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FAR = 8.0  # times the largest error of a front: beyond it no other design is drawn
-
 
 @dataclass(frozen=True, slots=True)
 class FrontMark:
@@ -55,7 +53,9 @@ def pareto_front(
         for point in points:
             tell(axes, point.cost, point.error_m, _says(point, currency, limit))
         errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
-        around = _near(cloud, points, axes.get_xlim()[1])
+        around = scales.in_view(
+            cloud, [p.cost for p in points], max(p.error_m for p in points), cost_limit
+        )
         errors += [p.error_m for p in around]
         _cloud(axes, around, currency, limit)
         if beside is not None:
@@ -76,18 +76,13 @@ def pareto_front(
     return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
 
 
-def _near(
-    cloud: Sequence[FrontMark], front: Sequence[FrontMark], most: float
-) -> list[FrontMark]:  # fmt: skip
-    """Designs whose price has a place on the axis and whose error is not far from the front's."""
-    far = FAR * max(p.error_m for p in front)
-    return [p for p in cloud if p.cost <= most and p.error_m <= far]
-
-
 def _cloud(
     axes: Axes, shown: Sequence[FrontMark], currency: str, limit: numbers.Limited | None
 ) -> None:
     """Other designs: a quiet dot each, a cross for those that break another requirement."""
+    left, right = axes.get_xlim()
+    cheapest = min((p.cost for p in shown), default=right)
+    axes.set_xlim(max(0.0, min(left, cheapest - 0.04 * (right - cheapest))), right)
     for marker, size, breaks in (("o", 3.0, False), ("x", 3.0, True)):
         some = [p for p in shown if p.breaks is breaks]
         axes.plot([p.cost for p in some], [p.error_m for p in some], marker, color=MUTED,
@@ -106,15 +101,14 @@ def _says(point: FrontMark, currency: str, limit: numbers.Limited | None) -> lis
 def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None) -> None:
     costs = [p.cost for p in points]
     errors = [p.error_m for p in points]
-    span = max(costs) - min(costs) or max(costs) or 1.0
-    right = max([max(costs) + 0.15 * span, *([1.04 * cost_limit] if cost_limit else [])])
+    left, right = scales.price_axis(costs, cost_limit)
     axes.set_yscale("log")
     axes.step([*costs, right], [*errors, errors[-1]], where="post", color=LINE, linewidth=2)
     axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)
     for point in points:
         if point.chosen:
             _named_mark(axes, point.cost, point.error_m, "chosen", GOOD)
-    axes.set_xlim(max(0.0, min(costs) - 0.12 * span), right)
+    axes.set_xlim(left, right)
 
 
 def _named_mark(axes: Axes, cost: float, error_m: float, words: str, color: str) -> None:

@@ -13,6 +13,7 @@ from syncline_design.planning.telling import PlanRun
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
+from syncline_design.report.charts_ways import from_above
 from syncline_design.report.palette import INK, MUTED, SERIES
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
@@ -48,10 +49,7 @@ def path(run: PlanRun) -> InlineChart:
             place = _place(one.east_m, one.north_m)
             tell(axes, one.east_m, one.north_m, [("Mark", f"target {k}"), ("Place", place)])
         axes.plot(east[:1], north[:1], "o", color=SERIES[0], markersize=4.5)
-        axes.set_aspect("equal", adjustable="datalim")
-        axes.set_xlabel("east, m")
-        axes.set_ylabel("north, m")
-        scales.grid(axes)
+        from_above(axes)
 
     wide, high = float(np.ptp(east)), float(np.ptp(north))
     spoken = (

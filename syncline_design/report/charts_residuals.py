@@ -15,6 +15,7 @@ from syncline_design.report import axes as scales
 from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
+from syncline_design.report.charts_ways import breadth, from_above, map_height
 from syncline_design.report.palette import INK, MUTED, SERIES
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LONGEST = 0.12  # of the map's width: the longest arrow
-LOWEST, HIGHEST, LABELS = 130.0, 340.0, 90.0  # of the map's height [SVG units]
 BINS = 24
 UNITS = {"speed": "m/s", "turn_rate": "deg/s", "range": "m", "heading": "deg"}
 
@@ -37,19 +37,13 @@ def longest_m(track: PlottedTrack) -> tuple[float, float]:
 
 def drawn_larger(track: PlottedTrack) -> float:
     """How many times larger than the map the arrows are drawn."""
-    span = max(_span(track.north_m), _span(track.east_m), 1e-9)
-    return LONGEST * span / max(*longest_m(track), 1e-12)
-
-
-def _span(values: Sequence[float]) -> float:
-    return max(values) - min(values) if values else 0.0
+    wide = max(breadth(track.north_m), breadth(track.east_m), 1e-9)
+    return LONGEST * wide / max(*longest_m(track), 1e-12)
 
 
 def track_map(track: PlottedTrack, name: str = "fig-track") -> InlineChart:
     """The way from above, with the mean residual of each stretch as an arrow."""
     larger = drawn_larger(track)
-    shape = _span(track.north_m) / max(_span(track.east_m), 1e-9)
-    height = min(max(WIDTH * shape, LOWEST), HIGHEST) + LABELS
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
@@ -76,16 +70,14 @@ def track_map(track: PlottedTrack, name: str = "fig-track") -> InlineChart:
                 ("Mean residual before", numbers.length(sizes[0], 3)),
                 ("after", numbers.length(sizes[1], 3)),
             ])  # fmt: skip
-        axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.1)
-        axes.set_xlabel("east [m]")
-        axes.set_ylabel("north [m]")
+        from_above(axes)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.25), ncols=3)
-        scales.grid(axes)
 
     first, last = (numbers.length(size, 3) for size in longest_m(track))
     spoken = f"Mean residual of {len(track.arrows)} stretches: at most {first} before, {last} after"
-    return draw(name, "Residuals along the way", spoken, (WIDTH, height), build)
+    size = (WIDTH, map_height(track.north_m, track.east_m))
+    return draw(name, "Residuals along the way", spoken, size, build)
 
 
 def binned(values: Sequence[float], sizes_m: Sequence[float]) -> list[tuple[float, float]]:

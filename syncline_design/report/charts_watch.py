@@ -1,4 +1,4 @@
-"""Charts of a watch: the evidence for a change, and every parameter over the runs."""
+"""Charts of many logs: the evidence for a change, every parameter over the runs or the logs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
-from syncline_design.report.palette import BAD, MUTED, SERIES
+from syncline_design.report.palette import BAD, MUTED, SERIES, SHADE
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 
@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from syncline_design.diagnosis.result import Estimate, PerLog
+
 Key = tuple[str, str, str, str]  # effect, sensor, stage, parameter
 ACROSS: Final = 2
-HEIGHT: Final = 118.0  # of a row of panels
+HEIGHT: Final = 130.0  # of a row of panels
 MOST: Final = 1e12
 
 
@@ -75,7 +77,7 @@ def _panel(
 ) -> None:
     points = [(r.run, v) for r in runs for v in r.values if _key(v) == key]
     shown = [(run, v) for run, v in points if v.interval95 is not None]
-    scale, unit = _scale([v for _, v in shown], key[3])
+    scale, unit = _scale([v.interval95 or () for _, v in shown], key[3])
     colour = BAD if since is not None else SERIES[0]
     for run, v in shown:
         low, high = v.interval95 or (0.0, 0.0)
@@ -92,7 +94,8 @@ def _panel(
     if since is not None:
         axes.axvline(since - 0.5, color=BAD, linewidth=1.0, linestyle=(0, (4, 3)))
     effect, sensor, _, parameter = key
-    title = shortened(f"{effect.replace('_', ' ')} ({sensor})", 20 if many else 40)
+    name = effect.replace("_", " ")
+    title = f"{shortened(name, 26)}\n{sensor}" if many else shortened(f"{name} ({sensor})", 40)
     axes.set_title(title, loc="left", pad=3)
     figure, _, _ = parameter.rpartition("_")
     axes.set_ylabel(f"{figure or parameter}{f', {unit}' if unit else ''}")
@@ -104,9 +107,9 @@ def _key(one: RunValue) -> Key:
     return one.effect, one.sensor, one.stage, one.parameter
 
 
-def _scale(values: Sequence[RunValue], parameter: str) -> tuple[float, str]:
+def _scale(intervals: Sequence[Sequence[float]], parameter: str) -> tuple[float, str]:
     """A unit in which the values are easy to read: `ms` of `latency_s`."""
-    size = max((max(abs(end) for end in v.interval95 or (0.0,)) for v in values), default=0.0)
+    size = max((abs(end) for one in intervals for end in one), default=0.0)
     suffix = parameter.rpartition("_")[2]
     for unit, factor, name in (("s", 1.0, "s"), ("s", 1e-3, "ms"), ("s", 1e-6, "\u00b5s"),
                                ("m", 1.0, "m"), ("m", 1e-2, "cm"), ("m", 1e-3, "mm"),
@@ -117,6 +120,61 @@ def _scale(values: Sequence[RunValue], parameter: str) -> tuple[float, str]:
     exponent = round(math.log10(power))
     return (1.0, suffix if suffix == "radps" else "") if -2 <= exponent <= 3 else (
         power, f"1e{exponent}{' rad/s' if suffix == 'radps' else ''}")  # fmt: skip
+
+
+def by_log(logs: Sequence[PerLog], common: Mapping[str, Estimate], name: str) -> InlineChart:
+    """A panel a parameter: what each log by itself tells, with its interval; common: one value."""
+    names = drawn_by_log(logs)
+    across = min(ACROSS, len(names))
+    rows = math.ceil(len(names) / across)
+
+    def build(figure: Figure) -> None:
+        for place, parameter in enumerate(names):
+            axes = add_axes(figure, rows, across, place + 1)
+            _logs_panel(axes, logs, parameter, common.get(parameter))
+
+    spoken = "; ".join(
+        f"{parameter}: " + ", ".join(f"log {one.log} {one.parameters[parameter].text}"
+                                     for one in logs)
+        for parameter in names
+    )  # fmt: skip
+    height = HEIGHT * rows + (30.0 if across > 1 else 90.0)
+    return draw(name, "Values log by log", spoken, (WIDTH, height), build)
+
+
+def drawn_by_log(logs: Sequence[PerLog]) -> list[str]:
+    """Parameters that every one of several logs tells as a number with an interval."""
+    return [
+        name
+        for name in (logs[0].parameters if len(logs) > 1 else ())
+        if all(one.parameters[name].interval95 is not None for one in logs)
+    ]
+
+
+def _logs_panel(
+    axes: Axes, logs: Sequence[PerLog], parameter: str, common: Estimate | None
+) -> None:  # fmt: skip
+    ends = [one.parameters[parameter].interval95 or (0.0, 0.0) for one in logs]
+    scale, unit = _scale([*ends, (common and common.interval95) or ()], parameter)
+    if common is not None and common.interval95 is not None:
+        low, high = common.interval95
+        axes.axhspan(low / scale, high / scale, color=SHADE, linewidth=0, zorder=0)
+        axes.axhline(0.5 * (low + high) / scale, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
+    for one, (low, high) in zip(logs, ends, strict=True):
+        own = one.parameters[parameter]
+        axes.plot([one.log] * 2, [low / scale, high / scale], color=SERIES[0], linewidth=1.4)
+        axes.plot([one.log], [0.5 * (low + high) / scale], "o", color=SERIES[0], markersize=4)
+        tell(axes, one.log, 0.5 * (low + high) / scale, [
+            ("Log", f"{one.log}, {one.file}"), ("Value", own.text),
+            ("95 % interval", f"{numbers.number(low / scale, 4)} to "
+                              f"{numbers.number(high / scale, 4)} {unit}"),
+        ])  # fmt: skip
+    figure, _, _ = parameter.rpartition("_")
+    axes.set_ylabel(f"{figure or parameter}{f', {unit}' if unit else ''}")
+    axes.set_xlabel("log")
+    _whole_ticks(axes, [one.log for one in logs])
+    axes.margins(x=0.08)
+    scales.grid(axes, "y")
 
 
 def _whole_ticks(axes: Axes, runs: Sequence[int]) -> None:

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from syncline_design.verdict.tree import Verdict
 
 
-def choice_tables(verdict: Verdict) -> list[Table]:
-    """Every table of the choice that has rows."""
+def choice_tables(verdict: Verdict, limit: numbers.Limited | None) -> list[Table]:
+    """Every table of the choice that has rows; limit: of accuracy, in whose unit errors are."""
     choice = verdict.choice
     if choice is None:
         return []
     found = (
-        _priced(verdict, choice.front or (), "Pareto front: cost against error"),
-        _staircase(choice.staircase or (), currency_of(verdict)),
-        _priced(verdict, choice.next_best or (), "What else almost won"),
-        alternatives_table(choice.alternatives or (), currency_of(verdict)),
+        _priced(verdict, choice.front or (), "Pareto front: cost against error", limit),
+        _staircase(choice.staircase or (), currency_of(verdict), limit),
+        _priced(verdict, choice.next_best or (), "What else almost won", limit),
+        alternatives_table(choice.alternatives or (), currency_of(verdict), limit),
         _excluded(choice.excluded or ()),
     )
     return [entry for entry in found if entry is not None]
@@ -38,14 +38,16 @@ def _money(amount: float | None, currency: str) -> Cell:
     return Cell(numbers.money(amount, currency), amount)
 
 
-def _staircase(steps: Sequence[PriceStep], currency: str) -> Table | None:
+def _staircase(
+    steps: Sequence[PriceStep], currency: str, limit: numbers.Limited | None
+) -> Table | None:
     """What each accuracy costs: a row per step of the exact front."""
     rows = []
     for step in steps:
         loose = step.looser_than_m
-        below = f" to below {numbers.rounded_up(loose)}" if loose is not None else " and looser"
+        below = " and looser" if loose is None else f" to below {numbers.rounded_up(loose, limit)}"
         rows.append((
-            Cell(numbers.rounded_up(step.tightest_m) + below, step.tightest_m),
+            Cell(numbers.rounded_up(step.tightest_m, limit) + below, step.tightest_m),
             _money(step.cost, currency),
             _money(step.extra, currency),
         ))  # fmt: skip
@@ -65,17 +67,20 @@ def is_chosen(verdict: Verdict, entry: FrontDesign | RankedDesign) -> bool:
 
 
 def _priced(
-    verdict: Verdict, designs: Sequence[FrontDesign | RankedDesign], caption: str
+    verdict: Verdict,
+    designs: Sequence[FrontDesign | RankedDesign],
+    caption: str,
+    limit: numbers.Limited | None,
 ) -> Table | None:
     """A list of designs with price and error: the front, the next best."""
     currency = currency_of(verdict)
     rows = []
     for entry in designs:
         shown: tuple[str, Tone] = ("\u25c6", "good") if is_chosen(verdict, entry) else ("", "")
-        ways = [ways_cell(entry, currency)] if isinstance(entry, RankedDesign) else []
+        ways = [ways_cell(entry, currency, limit)] if isinstance(entry, RankedDesign) else []
         rows.append((
             _money(entry.cost, currency),
-            Cell(numbers.length(entry.error_m), entry.error_m),
+            Cell(numbers.error(entry.error_m, limit), entry.error_m),
             Cell(sensors(entry.design), tone=shown[1], mark=shown[0]), *ways,
         ))  # fmt: skip
     heads = ("Cost #", "Error #", "Design", "Ways of stamping it")[: len(rows[0]) if rows else 0]

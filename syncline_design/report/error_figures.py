@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from syncline_design.report import numbers, verdict_charts
-from syncline_design.report.document import Group, Node, Text, show
+from syncline_design.report.document import Group, Inline, Node, Text, code, show
 from syncline_design.report.table import Cell, Table, table
 
 if TYPE_CHECKING:
@@ -17,11 +17,13 @@ if TYPE_CHECKING:
 
 Row = tuple[str, float | None, float | None, str]  # name, over missions, one mission, what it is
 SHOWN_SHARE = 0.001
-LEAD = (
+LEAD: Final[Inline] = (
     "Three figures that claim three things. Each holds for the worst situation that the spec "
     "allows: directions of motion, rotation and look, lean up to the horizon's tilt, time and "
-    "place; where no `look` is given, level looks "
-    "count too. The Monte Carlo below draws directions at random and is therefore lower."
+    "place; where no ",
+    code("look"),
+    " is given, level looks count too. The Monte Carlo below draws directions at random and is "
+    "therefore lower.",
 )
 
 

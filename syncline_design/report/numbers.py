@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -62,12 +63,15 @@ def length(value: Any, digits: int = 4) -> str:
     return _shown(value, Dimension.LENGTH, digits)
 
 
-def rounded_up(value_m: float) -> str:
-    """A length rounded up to four figures: an accuracy that the printed price does buy."""
+def rounded_up(value_m: float, limit: Limited | None) -> str:
+    """A length rounded up to four figures: an accuracy that the printed price does buy.
+
+    In the unit of the limit that it is held against, where there is one.
+    """
     if not value_m > 0.0 or not math.isfinite(value_m):
-        return length(value_m)
+        return error(value_m, limit)
     scale = Fraction(10) ** (3 - math.floor(math.log10(value_m)))
-    return length(float(math.ceil(Fraction(value_m) * scale) / scale))
+    return error(float(math.ceil(Fraction(value_m) * scale) / scale), limit)
 
 
 def time(value: Any, digits: int = 4) -> str:
@@ -184,6 +188,19 @@ def held(value: Any, row: Limited, digits: int = 4) -> str:
 def error(value: Any, limit: Limited | None, digits: int = 4) -> str:
     """An error [m] in the unit of the limit that it is held against, where there is one."""
     return length(value, digits) if limit is None else held(value, limit, digits)
+
+
+def nats(value: float, digits: int = 3) -> str:
+    """A gain of likelihood, `160 000 nat`, typeset."""
+    return typeset(figure_text.format_nats(value, digits))
+
+
+_GAP: Final = re.compile(r"(?<=\d) (?=\d{3}(?!\d)|nat\b)")
+
+
+def unbroken(text: str) -> str:
+    """A text in which no line ends between groups of digits, or before nat."""
+    return _GAP.sub("\N{NO-BREAK SPACE}", text)
 
 
 _DIMENSIONS: Final = {

@@ -77,8 +77,10 @@ def _outcome(result: Acceptance) -> Outcome:
 
 def _sentences(result: Acceptance) -> Iterator[str]:
     rows = result.assumptions
-    counts = [f"{sum(r.status == s for r in rows)} {_OUTCOMES[s][2]}" for s in _ORDER]
-    yield f"Of {len(rows)} assumptions of the verdict: {', '.join(counts)}."
+    counts = {s: sum(r.status == s for r in rows) for s in _ORDER}
+    words = {s: _OUTCOMES[s][2] if n == 1 or s != "holds" else "hold" for s, n in counts.items()}
+    told = ", ".join(f"{n} {words[s]}" for s, n in counts.items())
+    yield f"Of {len(rows)} assumptions of the verdict: {told}."
     yield from (sentence(row) for row in rows if row.status == "broken")
 
 

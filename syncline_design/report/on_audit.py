@@ -61,7 +61,7 @@ MEND: Final[Mapping[str, str]] = {
     "relock": "leave the stretch out; let the clock lock before the run",
     "packetised": "set the serial chip's latency timer to 1 ms, or stamp by PPS",
     "truncated_stamps": "write stamps with all their digits",
-    "stamped_on_arrival": "let the sensor stamp (PPS, trigger); `diagnose` finds the mean latency",
+    "stamped_on_arrival": "let the sensor stamp (PPS, trigger); diagnose finds the mean latency",
     "end_of_scan": "declare which end of a scan the stamp is of",
     "start_of_scan": "declare which end of a scan the stamp is of",
     "duplicates": "drop the repeated messages, or mend the driver that stamps anew too late",

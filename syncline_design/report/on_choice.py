@@ -48,11 +48,13 @@ if TYPE_CHECKING:
 def on_choice(found: Optimized) -> Document:
     """The best designs of a spec as a document, or why there is none."""
     currency, result = found.case.spec.currency, found.result
+    limit = asked_limit(found.case, "accuracy")
     if found.text is None:
-        designs = designs_table(found.problem, found.designs, currency, result.designs)
+        designs = designs_table(found.problem, found.designs, currency, limit, result.designs)
     else:
-        designs = family_designs_table(result.designs, currency)
-    without = alternatives_table(result.alternatives or (), currency)
+        designs = family_designs_table(result.designs, currency, limit)
+    without = alternatives_table(result.alternatives or (), currency, limit)
+    bargains = bargain_nodes(result.bargains or (), currency, limit)
     return Document(
         family="Optimization",
         outcome=_outcome(found),
@@ -64,7 +66,7 @@ def on_choice(found: Optimized) -> Document:
             *section("designs", "Best designs", show(designs, silent=True)),
             *why_not_section(result, currency),
             *section("alternatives", "If a sensor cannot be had", show(without, silent=True)),
-            *section("bargains", "Worth a thought", bargain_nodes(result.bargains or (), currency)),
+            *section("bargains", "Worth a thought", bargains),
             *section("warnings", "Warnings", warning_nodes(found.result.warnings)),
             *_front(found),
             *section("hinges", "What it hinges on", hinges_nodes(found.result)),
@@ -153,11 +155,16 @@ def _why_not(found: Optimized, currency: str) -> list[Section]:
 
 
 def designs_table(
-    problem: Problem, designs: Iterable[Design], currency: str, named: Sequence[RankedDesign] = ()
+    problem: Problem,
+    designs: Iterable[Design],
+    currency: str,
+    limit: numbers.Limited | None,
+    named: Sequence[RankedDesign] = (),
 ) -> Table:
     """Best first, with what each costs and reaches, and what simulation leaves open.
 
-    named: the same designs, with how else their sensors can be stamped.
+    limit: of accuracy, in whose unit errors are told.  named: the same designs, with how else their
+    sensors can be stamped.
     """
     rows = []
     for place, (design, shown) in enumerate(itertools.zip_longest(designs, named), 1):
@@ -166,9 +173,9 @@ def designs_table(
         rows.append([
             Cell(str(place), float(place)),
             *(amount_cell(getattr(sums, name), name, currency) for name in _RESOURCES),
-            Cell(numbers.length(sums.error_m), sums.error_m),
+            Cell(numbers.error(sums.error_m, limit), sums.error_m),
             *_role_cells(problem, design),
-            Cell("") if shown is None else ways_cell(shown, currency),
+            Cell("") if shown is None else ways_cell(shown, currency, limit),
             Cell(_open_text(undecided)),
         ])  # fmt: skip
     heads = (
@@ -178,15 +185,17 @@ def designs_table(
     return table("Best designs", heads, rows)
 
 
-def family_designs_table(designs: Sequence[RankedDesign], currency: str) -> Table:
+def family_designs_table(
+    designs: Sequence[RankedDesign], currency: str, limit: numbers.Limited | None
+) -> Table:
     """Payloads for several missions, best first; the error is the largest of any mission."""
     rows = [
         [
             Cell(str(place), float(place)),
             *(amount_cell(getattr(one, name), name, currency) for name in _RESOURCES),
-            Cell(numbers.length(one.error_m), one.error_m),
+            Cell(numbers.error(one.error_m, limit), one.error_m),
             *_named_cells(one.design),
-            ways_cell(one, currency),
+            ways_cell(one, currency, limit),
         ]
         for place, one in enumerate(designs, 1)
     ]
@@ -195,7 +204,11 @@ def family_designs_table(designs: Sequence[RankedDesign], currency: str) -> Tabl
 
 
 def family_front_table(
-    front: Sequence[FrontDesign], resource: ResourceName, currency: str, figure: str | None = None
+    front: Sequence[FrontDesign],
+    resource: ResourceName,
+    currency: str,
+    limit: numbers.Limited | None,
+    figure: str | None = None,
 ) -> Table:
     """The front of several missions, a row per point.
 
@@ -205,8 +218,8 @@ def family_front_table(
     rows = [
         [
             amount_cell(getattr(one, resource), resource, currency),
-            *(Cell(numbers.length(one.figure_m), one.figure_m) for _ in over),
-            Cell(numbers.length(one.error_m), one.error_m),
+            *(Cell(numbers.error(one.figure_m, limit), one.figure_m) for _ in over),
+            Cell(numbers.error(one.error_m, limit), one.error_m),
             *_named_cells(one.design),
         ]
         for one in front
@@ -257,20 +270,21 @@ def _open_text(requirements: Sequence[str]) -> str:
 def _front(found: Optimized) -> list[Section]:
     """The exact front and what each accuracy costs on it."""
     resource, currency = found.settings.resource, found.case.spec.currency
+    limit = asked_limit(found.case, "accuracy")
     nodes: list[Node] = []
     if found.text is not None and found.result.front:
         words = found.result.front_figure
-        front = family_front_table(found.result.front, resource, currency, words)
+        front = family_front_table(found.result.front, resource, currency, limit, words)
         nodes += show(front, silent=True)
         steps = found.result.staircase or ()
-        nodes += show(staircase_table(steps, currency, resource, words))
+        nodes += show(staircase_table(steps, currency, resource, limit, words))
         nodes += [] if words is None else [Text(f"{OVER_FIGURE} {OF_MISSIONS}")]
     if found.points:
         words = found.result.front_figure
-        drawn = front_table(found.problem, found.points, resource, currency, words)
+        drawn = front_table(found.problem, found.points, resource, currency, limit, words)
         nodes += show(drawn, silent=True)
         steps = found.result.staircase or ()
-        nodes += show(staircase_table(steps, currency, resource, words))
+        nodes += show(staircase_table(steps, currency, resource, limit, words))
         if words is not None:
             nodes += [Text(OVER_FIGURE), *_figure_chart(found, words)]
     if found.result.front_left_out:
@@ -324,6 +338,7 @@ def front_table(
     points: Sequence[FrontPoint],
     resource: ResourceName,
     currency: str,
+    limit: numbers.Limited | None,
     figure: str | None = None,
 ) -> Table:
     """The Pareto front, a row per point; one that simulation leaves open says so.
@@ -334,8 +349,8 @@ def front_table(
     rows = [
         [
             amount_cell(point.amount, resource, currency),
-            *(Cell(numbers.length(point.drawn_m), point.drawn_m) for _ in over),
-            Cell(numbers.length(point.error_m), point.error_m),
+            *(Cell(numbers.error(point.drawn_m, limit), point.drawn_m) for _ in over),
+            Cell(numbers.error(point.error_m, limit), point.error_m),
             *_role_cells(problem, point.design),
             Cell(_open_text(point.undecided)),
         ]
@@ -349,16 +364,20 @@ def front_table(
 
 
 def staircase_table(
-    steps: Sequence[PriceStep], currency: str, resource: ResourceName, figure: str | None = None
+    steps: Sequence[PriceStep],
+    currency: str,
+    resource: ResourceName,
+    limit: numbers.Limited | None,
+    figure: str | None = None,
 ) -> Table:
     """The price of accuracy, or of another figure of the error, loosest target first."""
     rows = []
     for step in steps:
         loose = step.looser_than_m
-        upto = "and looser" if loose is None else f"to below {numbers.rounded_up(loose)}"
+        upto = "and looser" if loose is None else f"to below {numbers.rounded_up(loose, limit)}"
         more = Cell("") if step.extra is None else amount_cell(step.extra, resource, currency)
         rows.append([
-            Cell(f"{numbers.rounded_up(step.tightest_m)} {upto}", step.tightest_m),
+            Cell(f"{numbers.rounded_up(step.tightest_m, limit)} {upto}", step.tightest_m),
             amount_cell(step.cost, resource, currency), more,
         ])  # fmt: skip
     limits = "Accuracy limit #" if figure is None else f"Limit of {figure} #"

@@ -282,7 +282,7 @@ def finding_node(found: Finding) -> Node:
         Heading(given(_spaced(found.effect)), given(f"{found.sensor}, {found.stage}")),
         Text(_full_stop(_called(found)), reach="page"),
         Facts(tuple(facts)),
-        Text(f"Evidence: {_full_stop(found.evidence)}"),
+        Text(numbers.unbroken(f"Evidence: {_full_stop(found.evidence)}")),
         *scope_nodes(found),
     ]
     if found.varying:
@@ -338,9 +338,9 @@ def rival_text(one: Rival, *, alike: bool = False) -> str:
     if one.nats_worse >= 0.0:
         kept = "" if one.refitted else " with the noise kept"
         other = ", of another signature" if alike and one.cosine <= SAME else ""
-        return f"{_effect_text(one)}{other}, {numbers.number(one.nats_worse, 3)} nat worse{kept}"
+        return f"{_effect_text(one)}{other}, {numbers.nats(one.nats_worse)} worse{kept}"
     if not one.possible:
-        better = f"{numbers.number(-one.nats_worse, 3)} nat better"
+        better = f"{numbers.nats(-one.nats_worse)} better"
         why = "but only with impossible values"
         if registry()[one.effect].spread is not None:
             why = "but this log does not scatter as it would have to"

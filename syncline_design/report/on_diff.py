@@ -116,26 +116,47 @@ def signed_change(change: float, unit: str) -> str:
 
 
 def cause_words(cause: Cause) -> str:
+    """`stages[uav].distance 100 m to 60 m`; of a list what came and what went."""
     if cause.old is None:
-        return f"{cause.key} added ({_entries(cause.new or '')})"
+        return f"{cause.key} added ({_words(_held(cause.new or ''))})"
     if cause.new is None:
-        return f"{cause.key} removed ({_entries(cause.old)})"
-    return f"{cause.key} {cause.old} to {cause.new}"
+        return f"{cause.key} removed ({_words(_held(cause.old))})"
+    old, new = _held(cause.old), _held(cause.new)
+    if isinstance(old, list) and isinstance(new, list):
+        came = [_inner(one) for one in new if one not in old]
+        went = [_inner(one) for one in old if one not in new]
+        told = [f"{', '.join(some)} {verb}" for some, verb in ((came, "added"), (went, "removed"))
+                if some]  # fmt: skip
+        if told:
+            return f"{cause.key}: {' and '.join(told)}"
+    return f"{cause.key} {_words(old)} to {_words(new)}"
 
 
-def _entries(text: str) -> str:
-    """`kind mass, limit 3 kg` of a mapping written as JSON; any other text as it is."""
+def _held(text: str) -> object:
+    """The mapping or list that a text holds as JSON; any other text as it is."""
     try:
         found = json.loads(text, parse_float=str, parse_int=str)  # digits as they are written
     except ValueError:
         return text
-    if not isinstance(found, dict):
-        return text
-    return ", ".join(f"{key} {_plain(value)}" for key, value in found.items() if key != "id")
+    return found if isinstance(found, dict | list) else text
 
 
-def _plain(value: object) -> str:
-    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+def _words(value: object) -> str:
+    """`kind mass, limit 3 kg` of a mapping; its id stands in the key already."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_inner(one)}" for key, one in value.items() if key != "id")
+    if isinstance(value, list):
+        return ", ".join(map(_inner, value)) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "none" if value is None else str(value)
+
+
+def _inner(value: object) -> str:
+    """What stands inside a mapping or a list, in brackets where it is one itself."""
+    if isinstance(value, dict):
+        return f"({', '.join(f'{key} {_inner(one)}' for key, one in value.items())})"
+    return f"[{_words(value)}]" if isinstance(value, list) else _words(value)
 
 
 def _cause_line(cause: Cause) -> str:

@@ -92,10 +92,16 @@ def _placebo_text(gap: WholeGap) -> str:
     if placebo.nll_saved_per_sample is None or saved is None:
         return ""
     change = placebo.nll_saved_per_sample.value - saved.value
-    told = numbers.places(change, 4, sign=True)
+    told = f"{numbers.places(change, 4, sign=True)} nat"
     if abs(change) < NOTHING:
-        told = f"less than {numbers.number(NOTHING, 1)}"
-    return f"Adding {placebo.added} as well, which was not chosen: {told} nat per sample."
+        told = f"less than {numbers.number(NOTHING, 1)} nat"
+    told = numbers.typeset(told)
+    return f"Adding {_spaced(placebo)} as well, which was not chosen: {told} per sample."
+
+
+def _spaced(step: Gap) -> str:
+    """`azimuth bias (ranging)` of what was added."""
+    return (step.added or "").replace("_", " ")
 
 
 def _gap_chart(found: Diagnosis) -> list[Node]:
@@ -142,7 +148,7 @@ def gap_table(gap: WholeGap) -> Table | None:
             (Cell(f"{part}, after"), *_score_cells(regime.after)),
         ]
     if gap.placebo.held_out is not None:
-        label = f"after, plus a placebo: {gap.placebo.added}"
+        label = f"after, plus a placebo: {_spaced(gap.placebo)}"
         rows.append((Cell(label), *_score_cells(gap.placebo.held_out.after)))
     return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
 

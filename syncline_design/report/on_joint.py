@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 from syncline_design.diagnosis.result import Finding, Joint, LogAlone
+from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
-from syncline_design.report.document import Node, Text, code, show
+from syncline_design.report.document import Chart, Node, Text, code, show
 from syncline_design.report.table import Cell, table
 
 MOST_LOGS: Final = 12  # told outside the page
@@ -25,7 +27,7 @@ def scope_nodes(found: Finding) -> list[Node]:
     words = SCOPES[found.scope]
     if found.one_value is not None:
         words += f" {_tested(found)}"
-    nodes: list[Node] = [Text(words)]
+    nodes: list[Node] = [Text(words), *_by_log(found)]
     if found.per_log and any(one.parameters for one in found.per_log):
         names = list(found.per_log[0].parameters)
         rows: list[tuple[Cell | str, ...]] = [
@@ -37,6 +39,20 @@ def scope_nodes(found: Finding) -> list[Node]:
     elif found.per_log:
         nodes.append(Text(f"In {', '.join(one.file for one in found.per_log)}."))
     return nodes
+
+
+def _by_log(found: Finding) -> list[Node]:
+    """What each log by itself tells of it, in a figure."""
+    logs = found.per_log or found.each_log or ()
+    if not drawings.drawn_by_log(logs):
+        return []
+    name = "-".join((found.effect, found.sensor, found.stage))
+    common = found.parameters if found.scope == "build" else {}
+    caption = "What each log by itself tells of it, with its 95 % interval."
+    if common:
+        caption += " Band and dashed line: the one value of all logs."
+    draw = partial(drawings.by_log, logs, common, f"fig-logs-{name}")
+    return [Chart(f"logs-{name}", draw, caption)]
 
 
 def _tested(found: Finding) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from syncline_design.machine.sentences import sentence_list
-from syncline_design.report import numbers
+from syncline_design.report import numbers, verdict_charts
 from syncline_design.report.document import Facts, Node, Text, show
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import kind_text, margin_text, status_of
@@ -65,10 +65,13 @@ def _alone(verdict: Verdict, found: tuple[MissionVerdict, ...]) -> Table | None:
     design = verdict.design
     if design is None or len(known) < len(found):
         return None
-    rows = [_payload_row(one.name, one.alone, currency) for one in found if one.alone is not None]
+    limit = verdict_charts.front_limit(verdict)
+    rows = [
+        _payload_row(one.name, one.alone, currency, limit) for one in found if one.alone is not None
+    ]
     rows.append((
         Cell("all of them"), Cell(numbers.money(design.cost, currency), design.cost),
-        Cell(numbers.length(_worst(found)), _worst(found)), Cell(_sensors(design, found)),
+        Cell(numbers.error(_worst(found), limit), _worst(found)), Cell(_sensors(design, found)),
     ))  # fmt: skip
     costs = [one.cost for one in known if one.cost is not None]
     note = ""
@@ -80,11 +83,13 @@ def _alone(verdict: Verdict, found: tuple[MissionVerdict, ...]) -> Table | None:
     return table("One payload for all against one for each", heads, rows, note)
 
 
-def _payload_row(name: str, one: RankedDesign, currency: str) -> tuple[Cell, Cell, Cell, Cell]:
+def _payload_row(
+    name: str, one: RankedDesign, currency: str, limit: numbers.Limited | None
+) -> tuple[Cell, Cell, Cell, Cell]:
     return (
         Cell(f"{name} alone"),
         Cell(numbers.money(one.cost, currency), one.cost),
-        Cell(numbers.length(one.error_m), one.error_m),
+        Cell(numbers.error(one.error_m, limit), one.error_m),
         Cell(_sensors(one.design)),
     )
 
@@ -144,7 +149,7 @@ def _price(found: Robustness, verdict: Verdict) -> list[tuple[str, str]]:
     else:
         currency = verdict.spec.currency
         amount = numbers.money(nominal.cost, currency)
-        error = numbers.length(nominal.error_m)
+        error = numbers.error(nominal.error_m, verdict_charts.front_limit(verdict))
         facts.append(("At given figures", f"{_sensors(nominal.design)}: {amount}, {error}"))
     if found.probability is not None:
         one = found.probability

@@ -26,6 +26,7 @@ from syncline_design.report.formats import SIMULATE_FORMATS as SIMULATE_FORMATS
 from syncline_design.report.rendered import rendered
 from syncline_design.report.simulated import (
     BEYOND,
+    along_chart,
     certificate,
     ensemble,
     histogram_chart,
@@ -163,6 +164,7 @@ def _errors(result: Simulation) -> list[Node]:
         Text(f"Gaussian noise and the timing errors' own distributions. {BEYOND} "
              f"{ensemble(monte_carlo)}"),
         *histogram_chart(monte_carlo, None),
+        *along_chart(monte_carlo),
         *show(quantiles(monte_carlo)),
     ]  # fmt: skip
 

@@ -40,6 +40,7 @@ from syncline_design.report.on_missions import missions, robustness
 from syncline_design.report.on_nearest import nearest_nodes
 from syncline_design.report.simulated import (
     BEYOND,
+    along_chart,
     certificate,
     ensemble,
     histogram_chart,
@@ -207,7 +208,8 @@ def _bill(verdict: Verdict) -> list[Node]:
 def _timing(verdict: Verdict) -> list[Node]:
     if verdict.design is None:
         return []
-    table = verdict_tables.taus(verdict.design)
+    limit = verdict_charts.tightest_limit(verdict, "accuracy")
+    table = verdict_tables.taus(verdict.design, limit)
     lead = ("A sensor whose \u03c4 stays below its \u03c4_crit is limited by its own noise, not by "
             "its timestamps.")  # fmt: skip
     return [
@@ -224,19 +226,19 @@ def _syncline(verdict: Verdict) -> list[Node]:
     tau, crit = syncline.tau_s, syncline.tau_crit_s
     bound = "synchronisation" if crit is not None and tau >= crit else "sensor noise"
     facts = [
-        ("Sensor error (roof)", numbers.length(syncline.sensor_error_m)),
+        ("Sensor error (roof)", numbers.error(syncline.sensor_error_m, limit)),
         ("Synchronisation rate (slope)", numbers.speed(syncline.sync_rate_mps)),
         ("\u03c4 of the system", numbers.time(tau)),
         ("\u03c4_crit of the system", numbers.time_limit(crit)),
         ("Bound by", bound),
-        ("Synchronisation error", numbers.length(syncline.sync_error_m)),
+        ("Synchronisation error", numbers.error(syncline.sync_error_m, limit)),
         ("Total error", numbers.error(syncline.total_m, limit)),
         ("Drifts, grids, heave charged for", numbers.horizon(verdict.horizon)),
     ]
     for kind, label in (("systematic", "Known effects"), ("underway", "Between samples")):
         beside = [term.value_m for term in syncline.ledger if term.kind == kind]
         if beside:
-            facts.insert(-2, (label, numbers.length(math.fsum(beside))))
+            facts.insert(-2, (label, numbers.error(math.fsum(beside), limit)))
     column = Group((Facts(tuple(facts)), *verdict_charts.explorer(verdict)))
     return [Group((*chart, column), "split"), *show(verdict_tables.models(syncline, limit))]
 
@@ -244,7 +246,8 @@ def _syncline(verdict: Verdict) -> list[Node]:
 def _ledger(verdict: Verdict) -> list[Node]:
     if verdict.syncline is None:
         return []
-    table = verdict_tables.ledger(verdict.syncline)
+    limit = verdict_charts.tightest_limit(verdict, "accuracy")
+    table = verdict_tables.ledger(verdict.syncline, limit)
     return show(table, silent=True)
 
 
@@ -256,6 +259,7 @@ def _simulation(verdict: Verdict) -> list[Node]:
     return [
         Facts(tuple(simulation_facts(monte_carlo))),
         *(Text(text, quiet=True) for text in told),
+        *along_chart(monte_carlo),
         *show(quantiles(monte_carlo)),
     ]
 
@@ -266,8 +270,9 @@ def _choice(verdict: Verdict) -> list[Node]:
     nodes += verdict_charts.choice_chart(verdict)
     nodes += verdict_charts.figure_chart(verdict)
     found = verdict.choice.bargains if verdict.choice is not None else None
-    nodes += bargain_nodes(found or (), verdict_tables.currency_of(verdict))
-    for table in choice_tables.choice_tables(verdict):
+    limit = verdict_charts.front_limit(verdict)
+    nodes += bargain_nodes(found or (), verdict_tables.currency_of(verdict), limit)
+    for table in choice_tables.choice_tables(verdict, limit):
         nodes += _folded(table)
     return nodes
 

@@ -11,8 +11,9 @@ from syncline_design.report.words import ENVELOPES
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
-    from syncline_design.simulation.results import MonteCarlo, QuantileEstimate
+    from syncline_design.simulation.results import Along, MonteCarlo, QuantileEstimate, Stretch
 
+EVEN: Final = 1.1  # largest over smallest error along a trajectory up to which it is called even
 BEYOND: Final = (
     "Samples exceed a sum of one-sigma terms often (39 % of them where position noise is all there "
     "is) and do not contradict the Syncline."
@@ -102,3 +103,45 @@ def histogram_chart(found: MonteCarlo, syncline_m: float | None) -> list[Node]:
         "known."
     )
     return [Chart("histogram", draw, caption)]
+
+
+def along_chart(found: MonteCarlo) -> list[Node]:
+    """The trajectory of a file from above, with the errors along it."""
+    along, within = found.along, found.probability_within_target
+    if along is None:
+        return []
+
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_ways import errors_along
+
+        return errors_along(along, within)
+
+    return [Chart("along", draw, _along_words(along, within))]
+
+
+def _along_words(along: Along, limit: numbers.Limited | None) -> str:
+    """How the errors differ from stretch to stretch, and how the largest are flown."""
+    sizes = [one.quantile95_m for one in along.stretches]
+    low, high = (numbers.error(end, limit, 3) for end in (min(sizes), max(sizes)))
+    lead = (
+        f"The trajectory from above. Each of {len(sizes)} stretches of equal time is as wide as "
+        f"what 95 % of its simulated errors are within ({numbers.count(along.samples)} samples). "
+    )
+    most = along.largest
+    over = f" over {numbers.length(most.distance_m, 3)}" if most.distance_m else ""
+    motion = (
+        f"{numbers.speed(most.speed_mps, 3)} and "
+        f"{numbers.si_quantity(most.turn_rate_radps, 'rad/s', 3)}{over}"
+    )
+    told = f"Largest from {when(most)}: {high}, at {motion}; smallest: {low}."
+    if max(sizes) <= EVEN * min(sizes):
+        told = f"It is even: {span(low, high)} all along."
+    beyond = 0 if limit is None else sum(size > limit.limit for size in sizes)
+    if limit is not None and beyond:
+        told += f" {beyond} of {len(sizes)} exceed the limit of {numbers.limit(limit)}."
+    return lead + told
+
+
+def when(one: Stretch) -> str:
+    """`120 s to 130 s`."""
+    return " to ".join(numbers.si_quantity(end, "s", 4) for end in (one.from_s, one.to_s))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from syncline_design.model.quantity import Dimension, parse_quantity
+from syncline_design.report import axes as scales
 from syncline_design.report import choice_tables, numbers, verdict_tables, verdict_words
 from syncline_design.report.document import Chart, ExploredLimit, Explorer, Node
 from syncline_design.report.text import shortened
@@ -187,15 +188,17 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
     return [Chart("ledger", draw, caption)] if entries else []
 
 
-def _cloud_words(cloud: Sequence[CloudDesign], combinations: str | None) -> str:
-    """What the dots around the front are."""
-    if not cloud:
+def _cloud_words(
+    cloud: Sequence[CloudDesign], shown: Sequence[CloudDesign], combinations: str | None
+) -> str:
+    """What the dots around the front are; shown: those that are near enough to be drawn."""
+    if not shown:
         return ""
     every = combinations is not None and str(len(cloud)) == combinations
-    which = "every other design" if every else f"{len(cloud)} designs drawn at random"
-    broken = any(one.breaks for one in cloud)
+    which = "all designs" if every else f"{len(cloud)} designs drawn at random"
+    broken = any(one.breaks for one in shown)
     crosses = "; a cross breaks a requirement other than accuracy" if broken else ""
-    return f" Dots: {which}, as far as near the front{crosses}."
+    return f" Dots: of {which}, the {len(shown)} that lie near the front{crosses}."
 
 
 def choice_chart(verdict: Verdict) -> list[Node]:
@@ -211,15 +214,17 @@ def choice_chart(verdict: Verdict) -> list[Node]:
         if entry.cost is not None and entry.error_m
     ]  # fmt: skip
 
+    price, cloud = lowest_limit(verdict, "cost"), choice.cloud or ()
+    costs, worst_m = [point[0] for point in points], max((p[1] for p in points), default=0.0)
+    near = scales.in_view(cloud, costs, worst_m, price) if points else []
+
     def draw() -> InlineChart:
         from syncline_design.report.charts_front import FrontMark, pareto_front
 
-        limit, price = front_limit(verdict), lowest_limit(verdict, "cost")
+        limit = front_limit(verdict)
         drawn = [FrontMark(*point) for point in sorted(points, key=lambda point: point[0])]
         around = [
-            FrontMark(one.cost, one.error_m, False, one.payload, bool(one.breaks))
-            for one in choice.cloud or ()
-            if one.error_m
+            FrontMark(one.cost, one.error_m, False, one.payload, bool(one.breaks)) for one in near
         ]
         currency = verdict_tables.currency_of(verdict)
         return pareto_front(drawn, currency, limit, price, cloud=around)
@@ -227,7 +232,7 @@ def choice_chart(verdict: Verdict) -> list[Node]:
     caption = (
         "Every design on the line is the cheapest with that error; nothing exists below and left "
         "of it."
-    ) + _cloud_words(choice.cloud or (), verdict.spec.combinations)
+    ) + _cloud_words(cloud, near, verdict.spec.combinations)
     return [Chart("choice", draw, caption)] if len(points) > 1 else []
 
 
@@ -257,7 +262,7 @@ def figure_chart(verdict: Verdict) -> list[Node]:
     kind = "" if row is None else row.kind
     caption = (
         f"The designs of that front by the {found.figure} that {found.requirement} limits, each at "
-        "its worst situation. Others may lie between them: the exact front over this figure is "
-        f"`optimize --pareto --against {kind}`."
+        "its worst situation. Others may lie between them: optimize --pareto --against "
+        f"{kind} draws the exact front over this figure."
     )
     return [Chart("by-figure", draw, caption)]

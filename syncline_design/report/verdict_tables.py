@@ -166,8 +166,11 @@ def _amounts(
     )
 
 
-def taus(design: NamedDesign) -> Table:
-    """tau of each sensor against its tau_crit, as in the paper and with the lever arm."""
+def taus(design: NamedDesign, limit: RequirementResult | None) -> Table:
+    """tau of each sensor against its tau_crit, as in the paper and with the lever arm.
+
+    limit: of the total error, in whose unit the sensor's is told.
+    """
     rows = []
     for stage, role, entry in design.roles:
         tau, crit, lever = entry.tau_s, entry.tau_crit_s, entry.tau_crit_lever_arm_s
@@ -185,21 +188,21 @@ def taus(design: NamedDesign) -> Table:
                 "\u2713" if within else "\u2717",
             ),
             Cell(numbers.time_limit(lever), lever),
-            Cell(numbers.length(entry.sensor_error_m), entry.sensor_error_m),
+            Cell(numbers.error(entry.sensor_error_m, limit), entry.sensor_error_m),
         ))  # fmt: skip
     heads = ("Role", "Sensor", "\u03c4 #", "\u03c4_crit #", "Used #", "\u03c4_crit, lever arm #",
              "Sensor error #")  # fmt: skip
     return table("Timestamp error of each sensor against the largest it may have", heads, rows)
 
 
-def ledger(syncline: SynclineFigures) -> Table:
-    """Every term of the total error."""
+def ledger(syncline: SynclineFigures, limit: RequirementResult | None) -> Table:
+    """Every term of the total error, in the unit of its limit."""
     rows = [
         (
             term_text(entry),
             entry.stage,
             LEDGER_KINDS[entry.kind],
-            Cell(numbers.length(entry.value_m), entry.value_m),
+            Cell(numbers.error(entry.value_m, limit), entry.value_m),
             Cell(numbers.percent(entry.share), entry.share),
         )
         for entry in larger(syncline.ledger)
@@ -225,7 +228,7 @@ def models(syncline: SynclineFigures, limit: RequirementResult | None) -> Table:
     rows = [
         (
             SYNC_MODELS[key] + (" \u2014 decides" if key == syncline.model else ""),
-            Cell(numbers.length(entry.sync_error_m), entry.sync_error_m),
+            Cell(numbers.error(entry.sync_error_m, limit), entry.sync_error_m),
             Cell(numbers.error(entry.total_m, limit), entry.total_m),
         )
         for key, entry in found
@@ -235,7 +238,7 @@ def models(syncline: SynclineFigures, limit: RequirementResult | None) -> Table:
     rows.append(
         (
             "Syncline with the lever arm's rotation",
-            Cell(numbers.length(error), error),
+            Cell(numbers.error(error, limit), error),
             Cell(numbers.error(lever.total_m, limit), lever.total_m),
         )
     )

@@ -120,11 +120,53 @@ class WorstCase(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Way(Record):
+    """The way of a stage from above, thinned to what a figure can show."""
+
+    stage: str
+    north_m: tuple[float, ...]
+    east_m: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch(Record):
+    """Simulated errors at random moments of a stretch of a trajectory's time.
+
+    north_m, east_m: the last stage's place at its middle; speed, turn rate and distance: of that
+    stage, averaged over the stretch.
+    """
+
+    from_s: float
+    to_s: float
+    north_m: float
+    east_m: float
+    quantile95_m: float
+    rms_m: float
+    speed_mps: float
+    turn_rate_radps: float
+    distance_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Along(Record):
+    """The trajectory of a file, and the errors along it; samples: of each stretch."""
+
+    samples: int
+    ways: tuple[Way, ...]
+    stretches: tuple[Stretch, ...]
+
+    @property
+    def largest(self) -> Stretch:
+        """The stretch with the largest 95 % quantile."""
+        return max(self.stretches, key=lambda one: one.quantile95_m)
+
+
+@dataclass(frozen=True, slots=True)
 class MonteCarlo(Record):
     """The probabilistic answer, and the worst case at the system's tau.
 
     distances_m: by stage, the end of its distances that was simulated: the one where errors are
-    largest.
+    largest.  along: where a trajectory's file is followed and a figure was asked for.
     """
 
     samples: int
@@ -139,6 +181,7 @@ class MonteCarlo(Record):
     worst_case: WorstCase
     histogram: Histogram
     distances_m: Mapping[str, float] | None = optional()
+    along: Along | None = optional()
 
     def quantile(self, quantile: float) -> QuantileEstimate:
         """The estimate of one of the quantiles asked for."""

@@ -15,6 +15,7 @@ from syncline_design.model.budget import budget
 from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation import distribution
+from syncline_design.simulation.along import along
 from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
 from syncline_design.simulation.distribution import KEPT_VALUES, Binned, ErrorValues
 from syncline_design.simulation.ensemble import ensemble_of
@@ -107,6 +108,7 @@ def own_worst_case(system: System, seed: int) -> WorstCase:
 def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> Simulation:
     """Monte Carlo and the worst case against the Syncline over the grid of tau."""
     found = cross_check(system, settings).monte_carlo
+    found = replace(found, along=along(found, system, settings))
     figures = budget(system)
     grid = settings.tau_grid_s or DEFAULT_GRID_S
     trajectory = None

@@ -74,15 +74,16 @@ def trajectory_errors(
     settings: SimulationSettings,
     source: RandomSource,
     apart: RandomSource,
+    part: tuple[float, float] = (0.0, 1.0),
 ) -> Array:
     """Errors [m] of the chain at random moments, as many as the sources give, NED, (3, count).
 
-    apart: what effects draw from.
+    apart: what effects draw from.  part: of a file, as shares of its time, that moments are from.
     """
     shifts = timing_draws(system, source)
     acting = acting_effects.by_stage(system)
     mission = moment_draw(system.horizon, apart) if acting else None
-    moment = source.uniform(1)[0]
+    moment = part[0] + (part[1] - part[0]) * source.uniform(1)[0]
     repeated = settings.trajectory is None or str(settings.trajectory) in MANOEUVRES
     carried: known_effects.Carried | None = None
     for index, stage in enumerate(system.stages):

@@ -13,6 +13,7 @@ from syncline_design.spec.facts import (
     DistanceInterval,
     FieldOfView,
     Medium,
+    OneDistance,
     Reflectivity,
     TemperatureInterval,
 )
@@ -24,7 +25,6 @@ from syncline_design.spec.fields import (
     Money,
     NonEmptyText,
     NonNegativeLength,
-    PositiveLength,
     PositiveSpeed,
     Speed,
     Vector,
@@ -51,7 +51,7 @@ class PlatformChoice(FileRecord):
     name: str | None = None
     v_max: Speed | None = None
     omega_max: AngularRate | None = None
-    distance: PositiveLength | None = None
+    distance: OneDistance | None = None
     baseline: NonNegativeLength | None = None
     medium: Medium | None = None
     motion: Motion | None = None

@@ -74,6 +74,21 @@ def _read_span(value: Any) -> Quantity:
 DistanceInterval = Annotated[
     Quantity, ReadBy(_read_span, quantity_schema(Dimension.LENGTH, tolerance=True))
 ]
+
+
+def _read_distance(value: Any) -> Quantity:
+    """One distance; whoever gives two of a platform is told where these stand."""
+    if isinstance(value, str) and ".." in value:
+        span = read_quantity(value, Dimension.LENGTH, 0.0, above=True, tolerance=True)
+        hint = (
+            "several distances are a key of the stage, beside `platform`: distance: NEAR .. FAR; "
+            "then all of them count"
+        )
+        raise refusal("an interval where one distance is due", "one figure", span.text, hint)
+    return read_quantity(value, Dimension.LENGTH, 0.0, above=True)
+
+
+OneDistance = Annotated[float, ReadBy(_read_distance, quantity_schema(Dimension.LENGTH))]
 Rate = Annotated[float, figure_of(Dimension.FREQUENCY, 0.0, above=True)]
 
 

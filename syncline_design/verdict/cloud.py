@@ -13,7 +13,7 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import in_force
 from syncline_design.verdict.named import CloudDesign, FrontDesign
 
-MOST: Final = 400  # designs of a picture
+MOST: Final = 1000  # designs of a picture
 ROUNDED: Final = 1.0 + 1e-9
 SIMULATED: Final = "simulated"
 SEED: Final = 0  # which of many are drawn tells nothing, so that it need not follow the user's

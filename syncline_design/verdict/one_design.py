@@ -8,10 +8,11 @@ from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.problem import selection_of
 from syncline_design.choice.table import Design, Problem
 from syncline_design.effects.acting import known_of
-from syncline_design.machine.deadline import OutOfTime, in_force
+from syncline_design.machine.deadline import OutOfTime, Pieces, in_force
 from syncline_design.model.budget import budget
 from syncline_design.model.system import System
-from syncline_design.simulation import CrossCheck, SimulationError, cross_check
+from syncline_design.simulation import CrossCheck, MonteCarlo, SimulationError, cross_check
+from syncline_design.simulation.along import along
 from syncline_design.spec.case import Case
 from syncline_design.verdict.acceptance import (
     refuse_trajectory,
@@ -34,7 +35,7 @@ from syncline_design.verdict.measured import claim_cautions, measured
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.recheck import recheck
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.tree import Caution, Verdict
 from syncline_design.verdict.verified import (
     Verified,
     error_figures,
@@ -71,6 +72,18 @@ def _monte_carlo(
         if case.spec.monte_carlo.trajectory is not None:
             refuse_trajectory(case, str(error))
         return None, str(error)
+
+
+def _pictured(
+    case: Case, verified: Verified, settings: CheckSettings, pieces: Pieces
+) -> MonteCarlo | None:
+    """The simulation; for a picture with the errors along the trajectory of a file."""
+    found = verified.monte_carlo
+    if found is None or not settings.cloud:
+        return found
+    asked = simulation_settings(case, settings.seed)
+    told = pieces.made("errors along the way", lambda: along(found, verified.system, asked), None)
+    return replace(found, along=told)
 
 
 def _decided(
@@ -113,12 +126,16 @@ def verdict_on(
         verified.system, case.spec.sync_model, decided.design, told, by_id, settings.seed
     )
     asked = [row for row in verified.requirements if row.id in settings.explain]
+    pieces = Pieces()
+    simulated = _pictured(case, verified, settings, pieces)
     return replace(
         decided,
+        monte_carlo=simulated,
         warnings=(
             *cautions(case, verified, figures, assumed, transcripts(entries)),
             *claim_cautions(case, entries),
             *lifecycle_cautions(entries),
+            *(Caution(*one) for one in pieces.cautions),
         ),
         figures=figures,
         assumptions=assumed,
