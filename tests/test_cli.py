@@ -155,6 +155,19 @@ def test_a_pinned_check_imports_nothing_heavy() -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_a_check_of_an_open_spec_with_its_page_loads_no_solver(tmp_path: Path) -> None:
+    """The proof by a second road is loaded by whom it concerns: `--method milp`."""
+    code = (
+        "import sys; from typer.testing import CliRunner; from syncline_design.cli.app import app; "
+        "words = ['check', 'specs/uav_corridor.yaml', '-q', '-o', 'html:' + sys.argv[1]]; "
+        "done = CliRunner().invoke(app, words); "
+        "print(done.exit_code, sorted({'cvxpy', 'highspy', 'osqp', 'scs'} & set(sys.modules)))"
+    )
+    done = really("-c", code, str(tmp_path / "page.html"))
+    assert done.stdout.strip() == "0 []", done.stderr
+    assert (tmp_path / "page.html").stat().st_size > 10_000
+
+
 def test_an_interval_without_an_end_is_written_out(tmp_path: Path) -> None:
     """Few samples leave the upper end of a high quantile open: null in JSON, a word in text."""
     text = (ROOT / "specs" / "position_track.yaml").read_text(encoding="utf-8")
