@@ -86,10 +86,6 @@ def test_answer_comes_first(page: Page) -> None:
     assert places == sorted(places)
 
 
-def _mm(value_m: float) -> str:
-    return f"{1000.0 * value_m:.4g}\u00a0mm"
-
-
 def by_hand() -> list[str]:
     """What the sums of the data sheets come to: total error, tau_crit, slope."""
     attitude = math.radians(math.hypot(0.008, 0.008, 0.03)) * 100.0
@@ -98,7 +94,7 @@ def by_hand() -> list[str]:
     rate = 21.0 + 100.0 * math.radians(77.9)
     tau = 2 * 12.08e-6 + 2e-6  # two stamps by GPIO, the latency of one
     return [
-        _mm(sensors + rate * tau),
+        f"{sensors + rate * tau:.4g}\u00a0m",
         f"{1e6 * sensors / rate:.4g}\u00a0\u00b5s",
         f"{rate:.4g}\u00a0m/s",
     ]
@@ -113,11 +109,11 @@ def as_the_verdict_has_it() -> list[str]:
     within = verdict.monte_carlo.probability_within_target
     assert within is not None
     dearer, cheaper = (verdict.choice.staircase or ())[1::-1]
-    up = math.ceil(1e5 * dearer.tightest_m) / 1e2, math.ceil(1e4 * cheaper.tightest_m) / 10.0
+    up = math.ceil(1e5 * dearer.tightest_m) / 1e5, math.ceil(1e4 * cheaper.tightest_m) / 1e4
     return [
         f"{median.low_m:.4g}\u00a0m to {median.high_m:.4g}\u00a0m",
         f"{100.0 * within.low:.5g}\u00a0%",
-        f"{up[0]:.4g}\u00a0mm to below {up[1]:.4g}\u00a0mm",
+        f"{up[0]:.4g}\u00a0m to below {up[1]:.4g}\u00a0m",
         verdict.provenance.spec_sha256,
         verdict.warnings[0].message,
         (verdict.choice.excluded or ())[0].reason,

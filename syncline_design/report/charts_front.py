@@ -73,7 +73,7 @@ def pareto_front(
             figure.legend(loc="outside upper left", ncols=2, handlelength=1.6)
 
     title = f"Pareto front of cost against {over}"
-    return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
+    return draw(name, title, _front_words(points, currency, limit, beside), (WIDTH, 290.0), build)
 
 
 def _cloud(
@@ -117,20 +117,26 @@ def _named_mark(axes: Axes, cost: float, error_m: float, words: str, color: str)
 
 
 def _front_words(
-    points: Sequence[FrontMark], currency: str, beside: tuple[float, float] | None = None
+    points: Sequence[FrontMark],
+    currency: str,
+    limit: numbers.Limited | None,
+    beside: tuple[float, float] | None,
 ) -> str:
+    (cost, error), (last_cost, last_error) = (
+        (numbers.money(one.cost, currency), numbers.error(one.error_m, limit))
+        for one in (points[0], points[-1])
+    )
     spoken = (
-        f"{len(points)} designs from {numbers.money(points[0].cost, currency)} with an error of "
-        f"{numbers.length(points[0].error_m)} to {numbers.money(points[-1].cost, currency)} with "
-        f"{numbers.length(points[-1].error_m)}."
+        f"{len(points)} designs from {cost} with an error of {error} to {last_cost} with "
+        f"{last_error}."
     )
     for point in points:
         if point.chosen:
-            spoken += (
-                f" Chosen: {numbers.money(point.cost, currency)}, {numbers.length(point.error_m)}."
-            )
+            error = numbers.error(point.error_m, limit)
+            spoken += f" Chosen: {numbers.money(point.cost, currency)}, {error}."
     if beside is not None:
-        spoken += f" Nearest: {numbers.money(beside[0], currency)}, {numbers.length(beside[1])}."
+        error = numbers.error(beside[1], limit)
+        spoken += f" Nearest: {numbers.money(beside[0], currency)}, {error}."
     return spoken
 
 
