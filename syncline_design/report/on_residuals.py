@@ -43,18 +43,19 @@ def _over_time(plots: Plots) -> list[Node]:
 
 
 def _more(plots: Plots) -> Iterator[Node]:
+    """In an order that fills two columns to about the same height."""
     if plots.track is not None and plots.track.arrows:
         draw = partial(of_residuals.track_map, plots.track)
         yield Chart("track", draw, _track_words(plots.track))
+    if plots.spectrum is not None:
+        draw = partial(of_residuals.spectrum, plots.spectrum)
+        yield Chart("spectrum", draw, _spectrum_words(plots.spectrum))
     rows = {"time": plots.residuals.time_s, **(plots.motion or {})}
     rows = {name: values for name, values in rows.items() if len(set(values)) > 1}
     before, after = _sizes(plots)
     if plots.motion and rows and len(before) >= of_residuals.BINS:
         draw = partial(of_residuals.against, rows, before, after)
         yield Chart("against", draw, _against_words(rows, before, after))
-    if plots.spectrum is not None:
-        draw = partial(of_residuals.spectrum, plots.spectrum)
-        yield Chart("spectrum", draw, _spectrum_words(plots.spectrum))
     if plots.normal is not None:
         draw = partial(of_residuals.normal, plots.normal)
         yield Chart("normal", draw, _normal_words(plots.normal))
