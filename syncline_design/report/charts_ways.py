@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from syncline_design.simulation.results import Along, Stretch
+    from syncline_design.simulation.results import Along, FlownStretch
 
 LOWEST, HIGHEST, LABELS = 130.0, 340.0, 90.0  # of a map's height [SVG units]
 LEAST, MOST = 2.5, 9.0  # diameters of the smallest and the largest error [SVG units]
@@ -88,12 +88,12 @@ def _stretches(axes: Axes, found: Along, limit: numbers.Limited | None) -> None:
               label="largest")  # fmt: skip
 
 
-def is_beyond(one: Stretch, limit: numbers.Limited | None) -> bool:
+def is_beyond(one: FlownStretch, limit: numbers.Limited | None) -> bool:
     """Whether 95 % of the errors of a stretch need more than the limit."""
     return limit is not None and one.quantile95_m > limit.limit
 
 
-def _says(one: Stretch, limit: numbers.Limited | None) -> list[tuple[str, str]]:
+def _says(one: FlownStretch, limit: numbers.Limited | None) -> list[tuple[str, str]]:
     return [
         ("Time", when(one)),
         ("95 % of errors within", numbers.error(one.quantile95_m, limit, 3)),

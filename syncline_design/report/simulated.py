@@ -11,7 +11,7 @@ from syncline_design.report.words import ENVELOPES
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
-    from syncline_design.simulation.results import Along, MonteCarlo, QuantileEstimate, Stretch
+    from syncline_design.simulation.results import Along, FlownStretch, MonteCarlo, QuantileEstimate
 
 EVEN: Final = 1.1  # largest over smallest error along a trajectory up to which it is called even
 BEYOND: Final = (
@@ -142,6 +142,6 @@ def _along_words(along: Along, limit: numbers.Limited | None) -> str:
     return lead + told
 
 
-def when(one: Stretch) -> str:
+def when(one: FlownStretch) -> str:
     """`120 s to 130 s`."""
     return " to ".join(numbers.si_quantity(end, "s", 4) for end in (one.from_s, one.to_s))

@@ -14,7 +14,7 @@ from syncline_design.model.system import System
 from syncline_design.simulation.draws import RandomSource, time_margin_s
 from syncline_design.simulation.excursions import follows_a_file
 from syncline_design.simulation.kernel import norm
-from syncline_design.simulation.results import Along, MonteCarlo, Stretch, Way
+from syncline_design.simulation.results import Along, FlownStretch, FlownWay, MonteCarlo
 from syncline_design.simulation.settings import SimulationSettings
 from syncline_design.simulation.track import Track
 from syncline_design.simulation.trajectory import stage_track, trajectory_errors
@@ -62,14 +62,16 @@ def _errors_m(
     return norm(trajectory_errors(system, settings, source, apart, part))
 
 
-def _stretch(system: System, track: Track, ends_s: tuple[float, float], sizes_m: Array) -> Stretch:
+def _stretch(
+    system: System, track: Track, ends_s: tuple[float, float], sizes_m: Array
+) -> FlownStretch:
     stage = system.stages[-1]
     moments = np.linspace(*ends_s, MOMENTS)
     middle = track.position(np.array([0.5 * sum(ends_s)]))[0]
     distance = 0.0 if stage.ranging is None else float(stage.platform.distance_m)
     if track.sight is not None and stage.ranging is not None:
         distance = float(np.mean(np.interp(moments, track.time_s, track.sight[0])))
-    return Stretch(
+    return FlownStretch(
         from_s=ends_s[0],
         to_s=ends_s[1],
         north_m=float(middle[0]),
@@ -82,7 +84,7 @@ def _stretch(system: System, track: Track, ends_s: tuple[float, float], sizes_m:
     )
 
 
-def _way(stage: str, track: Track) -> Way:
+def _way(stage: str, track: Track) -> FlownWay:
     rows = np.unique(np.linspace(0, track.time_s.shape[0] - 1, WAY_POINTS).round().astype(int))
     north, east = track.position_m[rows, :2].T
-    return Way(stage, tuple(map(float, north)), tuple(map(float, east)))
+    return FlownWay(stage, tuple(map(float, north)), tuple(map(float, east)))

@@ -120,7 +120,7 @@ class WorstCase(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Way(Record):
+class FlownWay(Record):
     """The way of a stage from above, thinned to what a figure can show."""
 
     stage: str
@@ -129,7 +129,7 @@ class Way(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch(Record):
+class FlownStretch(Record):
     """Simulated errors at random moments of a stretch of a trajectory's time.
 
     north_m, east_m: the last stage's place at its middle; speed, turn rate and distance: of that
@@ -152,11 +152,11 @@ class Along(Record):
     """The trajectory of a file, and the errors along it; samples: of each stretch."""
 
     samples: int
-    ways: tuple[Way, ...]
-    stretches: tuple[Stretch, ...]
+    ways: tuple[FlownWay, ...]
+    stretches: tuple[FlownStretch, ...]
 
     @property
-    def largest(self) -> Stretch:
+    def largest(self) -> FlownStretch:
         """The stretch with the largest 95 % quantile."""
         return max(self.stretches, key=lambda one: one.quantile95_m)
 
