@@ -9,7 +9,6 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE
-from syncline_design.report.simulated import when
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ def is_beyond(one: FlownStretch, limit: numbers.Limited | None) -> bool:
 
 def _says(one: FlownStretch, limit: numbers.Limited | None) -> list[tuple[str, str]]:
     return [
-        ("Time", when(one)),
+        ("Time", numbers.from_to(one.from_s, one.to_s)),
         ("95 % of errors within", numbers.error(one.quantile95_m, limit, 3)),
         ("RMS", numbers.error(one.rms_m, limit, 3)),
         ("Speed", numbers.speed(one.speed_mps, 3)),
@@ -108,5 +107,5 @@ def spoken(found: Along, limit: numbers.Limited | None) -> str:
     """How the errors differ from stretch to stretch, and where they are largest."""
     sizes = [one.quantile95_m for one in found.stretches]
     low, high = (numbers.error(end, limit, 3) for end in (min(sizes), max(sizes)))
-    largest = when(found.largest)
+    largest = numbers.from_to(found.largest.from_s, found.largest.to_s)
     return f"95 % of the errors of a stretch are within {low} to {high}; largest from {largest}"

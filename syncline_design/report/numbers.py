@@ -84,6 +84,11 @@ def duration(seconds: float) -> str:
     return typeset(format_duration(seconds))
 
 
+def from_to(from_s: float, to_s: float) -> str:
+    """Two moments of a log, `120 s to 130 s`."""
+    return f"{si_quantity(from_s, 's')} to {si_quantity(to_s, 's')}"
+
+
 def like(shown: str, value: float, digits: int = 4) -> str:
     """A figure [SI] in the unit of a shown one: a change beside what has changed."""
     return typeset(figure_text.format_like(shown, value, digits))

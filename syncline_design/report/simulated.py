@@ -11,7 +11,7 @@ from syncline_design.report.words import ENVELOPES
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
-    from syncline_design.simulation.results import Along, FlownStretch, MonteCarlo, QuantileEstimate
+    from syncline_design.simulation.results import Along, MonteCarlo, QuantileEstimate
 
 EVEN: Final = 1.1  # largest over smallest error along a trajectory up to which it is called even
 BEYOND: Final = (
@@ -133,15 +133,11 @@ def _along_words(along: Along, limit: numbers.Limited | None) -> str:
         f"{numbers.speed(most.speed_mps, 3)} and "
         f"{numbers.si_quantity(most.turn_rate_radps, 'rad/s', 3)}{over}"
     )
-    told = f"Largest from {when(most)}: {high}, at {motion}; smallest: {low}."
+    when = numbers.from_to(most.from_s, most.to_s)
+    told = f"Largest from {when}: {high}, at {motion}; smallest: {low}."
     if max(sizes) <= EVEN * min(sizes):
         told = f"It is even: {span(low, high)} all along."
     beyond = 0 if limit is None else sum(size > limit.limit for size in sizes)
     if limit is not None and beyond:
         told += f" {beyond} of {len(sizes)} exceed the limit of {numbers.limit(limit)}."
     return lead + told
-
-
-def when(one: FlownStretch) -> str:
-    """`120 s to 130 s`."""
-    return " to ".join(numbers.si_quantity(end, "s", 4) for end in (one.from_s, one.to_s))
