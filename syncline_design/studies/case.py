@@ -47,7 +47,7 @@ class CaseSettings:
         return cls(seed, today or date.today(), engine_sha256(), libraries())
 
 
-LIBRARIES = ("numpy", "scipy", "cvxpy", "cvxpy-base", "highspy", "pydantic", "PyYAML", "pymap3d")
+LIBRARIES = ("numpy", "scipy", "cvxpy", "highspy", "pydantic", "PyYAML", "pymap3d")
 
 
 def libraries() -> tuple[str, ...]:
