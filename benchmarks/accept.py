@@ -3,9 +3,9 @@
     python -m benchmarks.accept [--sound 30] [--rounds 3] [--seed 0] [--write docs/accept.md]
 
 Sound logs of every vehicle, motion and noise of `benchmarks/accept_world.py`, and logs with each
-fault in turn.  A fault is found where its row is broken, or that of its twin (an error of the other
-lever arm, a turn of the other sensor), which no log tells apart.  Prints a line a log and keeps it
-in out/accept.jsonl, where a run that was stopped goes on.
+fault in turn.  A fault is found where its row is broken, or is of a group of which one row is; or
+that of its twin (an error of the other lever arm, a turn of the other sensor).  Prints a line a log
+and keeps it in out/accept.jsonl, where a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -152,7 +152,8 @@ def solved(task: Task) -> dict[str, Any]:
         found = accept(load(spec), [log], seed=0).to_json()
     rows = {
         f"{row['role']}/{row['assumption']}": {
-            "status": row["status"], "measured": row["measured"], "words": row["evidence"],
+            "status": "one_of" if row.get("one_of") else row["status"],
+            "measured": row["measured"], "words": row["evidence"],
         }
         for row in found["assumptions"]
         if row["assumption"] != "timing"
@@ -182,9 +183,12 @@ def inside(measured: dict[str, Any] | None, truth: float) -> bool | None:
 
 @dataclass(frozen=True)
 class Score:
-    """One log: planted rows that are broken, not shown, held; sound rows that are broken."""
+    """One log: planted rows that are broken, in a group of which one is, not shown, held; sound
+    rows that are broken; groups without a planted row.
+    """
 
     found: int
+    grouped: int
     open: int
     held: int
     elsewhere: tuple[str, ...]
@@ -195,7 +199,7 @@ class Score:
 def scored(one: dict[str, Any]) -> Score:
     rows, truths = one["rows"], one["truths"]
     twins = {t for row in truths if (t := twin(row))}
-    status: dict[str, list[str]] = {"broken": [], "not_shown": [], "holds": []}
+    status: dict[str, list[str]] = {s: [] for s in ("broken", "one_of", "not_shown", "holds")}
     intervals, held = [], []
     for row, truth in truths.items():
         other = twin(row)
@@ -203,27 +207,34 @@ def scored(one: dict[str, Any]) -> Score:
         said = own["status"]
         if other is not None and rows[other]["status"] == "broken":
             own, said = rows[other], "broken"
+        elif other is not None and said != "broken" and rows[other]["status"] == "one_of":
+            own, said = (own if said == "one_of" else rows[other]), "one_of"
         status[said].append(row)
         good = inside(own["measured"], truth) if truth else None
         if good is not None:
-            (intervals if said == "broken" else held if said == "holds" else []).append(good)
+            told = said in ("broken", "one_of")
+            (intervals if told else held if said == "holds" else []).append(good)
     allowed = set(truths) | twins
     if "35 s" in (one["fault"] or "") or "fast" in (one["fault"] or ""):
         allowed |= {"platform/rate"}
     elsewhere = tuple(
         r for r, row in rows.items() if row["status"] == "broken" and r not in allowed
     )
-    return Score(len(status["broken"]), len(status["not_shown"]), len(status["holds"]), elsewhere,
-                 tuple(intervals), tuple(held))  # fmt: skip
+    in_groups = [r for r, row in rows.items() if row["status"] == "one_of"]
+    if in_groups and not allowed.intersection(in_groups):
+        elsewhere = (*elsewhere, " or ".join(in_groups))
+    counts = [len(status[key]) for key in ("broken", "one_of", "not_shown", "holds")]
+    return Score(*counts, elsewhere, tuple(intervals), tuple(held))
 
 
 def line(one: dict[str, Any]) -> str:
     got = scored(one)
     counts = [sum(r["status"] == s for r in one["rows"].values())
-              for s in ("holds", "not_shown", "broken")]  # fmt: skip
-    return (f"{one['name']}  {one['drive'][:3]}  holds/not shown/broken {counts}  planted: "
-            f"{got.found} found, {got.open} open, {got.held} held; elsewhere {got.elsewhere}; "
-            f"intervals {got.intervals} {got.held_inside}  {one['seconds']:.0f} s")  # fmt: skip
+              for s in ("holds", "not_shown", "one_of", "broken")]  # fmt: skip
+    return (f"{one['name']}  {one['drive'][:3]}  holds/not shown/one of/broken {counts}  planted: "
+            f"{got.found} found, {got.grouped} in a group, {got.open} open, {got.held} held; "
+            f"elsewhere {got.elsewhere}; intervals {got.intervals} {got.held_inside}  "
+            f"{one['seconds']:.0f} s")  # fmt: skip
 
 
 def table(found: Sequence[dict[str, Any]], seed: int) -> str:
@@ -237,26 +248,27 @@ def table(found: Sequence[dict[str, Any]], seed: int) -> str:
         f"{len(sound)} sound logs and {len(broken)} with a fault, of a world of its own "
         f"(4 vehicles, 3 motions, 200 s at 5 Hz, horizon of 10 min).",
         "",
-        "| sound logs, noise | logs | rows that hold | not shown | broken |",
-        "|---|--:|--:|--:|--:|",
+        "| sound logs, noise | logs | rows that hold | not shown | one of several | broken |",
+        "|---|--:|--:|--:|--:|--:|",
     ]
     for noise in NOISES:
         quiet = [one for one in sound if one["drive"][2] == noise]
         counts = [
             sum(row["status"] == s for one in quiet for row in one["rows"].values())
-            for s in ("holds", "not_shown", "broken")
+            for s in ("holds", "not_shown", "one_of", "broken")
         ]
         lines.append(f"| {noise} | {len(quiet)} | " + " | ".join(map(str, counts)) + " |")
     lines += [
         "",
-        "| fault | logs | its rows: broken | not shown | held | others broken |",
-        "|---|--:|--:|--:|--:|--:|",
+        "| fault | logs | its rows: broken | one of several | not shown | held | others broken |",
+        "|---|--:|--:|--:|--:|--:|--:|",
     ]
     for fault in dict.fromkeys(one["fault"] for one in broken):
         own = [s for one, s in zip(broken, scores, strict=True) if one["fault"] == fault]
         figures = [
             len(own),
             sum(s.found for s in own),
+            sum(s.grouped for s in own),
             sum(s.open for s in own),
             sum(s.held for s in own),
             sum(len(s.elsewhere) for s in own),
@@ -266,9 +278,9 @@ def table(found: Sequence[dict[str, Any]], seed: int) -> str:
     held = [hit for s in scores for hit in s.held_inside]
     lines += [
         "",
-        f"Intervals of broken rows hold the truth in {sum(intervals)} of {len(intervals)}: "
-        f"{proportion(intervals)}; those of rows that hold beside a fault that does not turn the "
-        f"verdict in {sum(held)} of {len(held)}.",
+        f"Intervals of these rows (broken, one of several) hold the truth in {sum(intervals)} of "
+        f"{len(intervals)}: {proportion(intervals)}; those of rows that hold beside a fault that "
+        f"does not turn the verdict in {sum(held)} of {len(held)}.",
     ]
     return "\n".join(lines)
 

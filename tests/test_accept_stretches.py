@@ -243,6 +243,31 @@ def test_a_delay_and_an_arm_that_cancel_are_told_of_one_another(tmp_path: Path) 
         assert f"{other} (position) undoes it" in row.evidence
 
 
+def test_two_faults_that_look_like_one_of_another_sensor_are_no_wrong_row(tmp_path: Path) -> None:
+    """Ranges 20 ms late and their arm 0.1 m off add up at one speed v: 20 ms + 0.1 m / v of delay.
+
+    Another sensor's delay, or an arm, would be as much; what is wrong is among what is named.
+    """
+    run = world("straight_constant_speed", 1, 40.0, 3.0)
+    effects = (hidden("latency", "ranging", latency_s=0.02),
+               hidden("lever_arm", "ranging", x_m=-0.1, y_m=0.0, z_m=0.0))  # fmt: skip
+    spec, log = files(tmp_path, run, effects)
+    told = accept(load(spec), [log], AcceptSettings(("latency", "lever_arm")), seed=0)
+    assert told.exit_code == 1
+    assert not [row for row in told.assumptions if row.status == "broken"]
+    (group,) = told.groups
+    rows = {row.name: row for row in told.assumptions}
+    for name, truth in (("latency", 0.02), ("lever_arm", 0.1)):
+        row = rows[f"{run.carriers[0].name}/ranging/{name}"]
+        assert row.name in group.rows
+        assert row.measured is not None
+        assert row.measured.low is not None
+        assert row.measured.high is not None
+        assert row.measured.low < truth < row.measured.high
+    assert group.tell_apart is not None
+    assert "latency" in group.tell_apart
+
+
 def test_noise_is_split_between_sensors_with_intervals_that_hold(tmp_path: Path) -> None:
     """Places scatter 1.4 times, the rest as the spec says: two logs, 8 intervals of 95 %."""
     missed = 0

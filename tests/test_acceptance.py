@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.comparison.acceptance import (
     NAMES,
     Acceptance,
+    AssumptionName,
     AssumptionResult,
     MeasuredFigure,
 )
@@ -37,6 +39,7 @@ from syncline_design.diagnosis.result import (
     BlindSpot,
     Check,
     Diagnosis,
+    Estimate,
     Informative,
     Rival,
     Smallest,
@@ -192,7 +195,7 @@ def test_what_a_finding_may_be_instead_is_not_shown(found: Diagnosis) -> None:
     alias = Rival("lever_arm", "position", "multirotor", 1.0, 0.1)
     either = replace(found, findings=(replace(finding, aliases=(alias,)),))
     rows = dict(judged(case, either))
-    assert rows["position", "latency"].status == "broken"
+    assert rows["position", "latency"].status == "not_shown"
     assert rows["position", "lever_arm"].status == "not_shown"
     stand_in = replace(found, findings=(replace(finding, kind="stand_in"),), verdict="unexplained")
     assert dict(judged(case, stand_in))["position", "latency"].status == "not_shown"
@@ -203,6 +206,103 @@ def test_what_a_finding_may_be_instead_is_not_shown(found: Diagnosis) -> None:
     small = {"latency_s": replace(finding.parameters["latency_s"], value=3.2e-3)}  # turns SYNC
     turning = replace(slight, findings=(replace(kept, parameters=small),))
     assert dict(judged(case, turning))["position", "latency"].status == "broken"
+
+
+def seen_as(found: Diagnosis, short: Path, only: tuple[AssumptionName, ...] = NAMES,
+            instead: tuple[InItsPlace, ...] = ()) -> Acceptance:  # fmt: skip
+    """What is said of a log whose diagnosis is this one."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(acceptance, "sighted", lambda *_: Sighted(found, instead=instead))
+        return accept(load(EXAMPLE), [short], AcceptSettings(only), seed=0)
+
+
+def aliased(found: Diagnosis, *others: Rival) -> Diagnosis:
+    """The same with a delay of the position that these explain as well."""
+    (finding,) = [f for f in found.findings if f.effect == "latency"]
+    return replace(found, findings=(replace(finding, aliases=others, probability=0.6),))
+
+
+def rival(effect: str, sensor: str, probability: float, **figures: float) -> Rival:
+    told = {
+        name: Estimate(value, 0.1 * abs(value), name.rpartition("_")[2], True, "", (value, value))
+        for name, value in figures.items()
+    }
+    return Rival(effect, sensor, "multirotor", 1.0, 0.1, probability=probability, parameters=told)
+
+
+def test_of_what_a_log_cannot_tell_apart_one_is_broken_and_each_has_its_figure(
+    found: Diagnosis, short: Path
+) -> None:
+    """A delay or an arm: no row is the wrong one, the exit code is that of a broken one."""
+    arm = rival("lever_arm", "position", 0.3, x_m=0.5, y_m=0.0, z_m=0.0)
+    survey = rival("datum_offset", "target", 0.1, north_m=0.5, east_m=0.0, down_m=0.0)
+    either = seen_as(aliased(found, arm, survey), short)
+    rows = rows_of(either)
+    assert (either.verdict, either.exit_code) == ("broken", 1)
+    assert not [row for row in either.assumptions if row.status == "broken"]
+    (group,) = either.groups
+    names = ("multirotor/position/latency", "multirotor/position/lever_arm")
+    assert group.rows == names
+    assert either.broken_by == (" or ".join(names),)
+    assert {key for key, row in rows.items() if row.one_of == 1} == {
+        ("position", "latency"), ("position", "lever_arm"),
+    }  # fmt: skip
+    for name, value in (("latency", LATENCY_S), ("lever_arm", 0.5)):
+        measured = rows["position", name].measured
+        assert measured is not None
+        assert measured.value == pytest.approx(value, abs=1e-3)
+    assert [one.departures[0].rows for one in group.ways] == [(names[0],), (names[1],), ()]
+    assert "position" in group.look_first
+    assert group.tell_apart is not None
+    assert group.tell_apart.endswith("--separate 'latency(position)' 'lever_arm(position)'")
+
+
+def test_a_row_that_every_explanation_breaks_is_broken(found: Diagnosis, short: Path) -> None:
+    """A delay that grows with the frequency is one as well: the row is the same."""
+    lag = rival("filter_lag", "position", 0.4, time_constant_s=0.087)
+    told = seen_as(aliased(found, lag), short)
+    assert rows_of(told)["position", "latency"].status == "broken"
+    assert told.groups == ()
+
+
+def test_what_was_not_asked_may_be_what_is_broken(found: Diagnosis, short: Path) -> None:
+    """Of a delay or an arm only the delay is asked: it is not shown, not broken."""
+    arm = rival("lever_arm", "position", 0.3, x_m=0.5, y_m=0.0, z_m=0.0)
+    told = seen_as(aliased(found, arm), short, ("latency",))
+    assert (told.verdict, told.exit_code, told.groups) == ("not_shown", 3, ())
+    assert "lever_arm (position)" in rows_of(told)["position", "latency"].evidence
+
+
+def test_no_drive_tells_two_arms_apart(found: Diagnosis, short: Path) -> None:
+    """Errors of both arms that are equal move no object: a tape does."""
+    (late,) = [f for f in found.findings if f.effect == "latency"]
+    figures = {f"{axis}_m": replace(late.parameters["latency_s"], unit="m") for axis in "xyz"}
+    other = rival("lever_arm", "ranging", 0.5, x_m=0.1, y_m=0.1, z_m=0.1)
+    off = replace(late, effect="lever_arm", parameters=figures, aliases=(other,))
+    told = seen_as(replace(found, findings=(off,)), short)
+    (group,) = told.groups
+    assert group.tell_apart is None
+    text = render_acceptance("markdown", told)
+    assert "No drive tells these apart" in text
+
+
+def test_every_format_names_the_group(found: Diagnosis, short: Path) -> None:
+    arm = rival("lever_arm", "position", 0.3, x_m=0.5, y_m=0.0, z_m=0.0)
+    told = seen_as(aliased(found, arm), short)
+    written = json.loads(render_acceptance("json", told))
+    jsonschema.validate(written, result_schema("acceptance"))
+    assert [row["one_of"] for row in written["assumptions"] if "one_of" in row] == [1, 1]
+    suite = ElementTree.fromstring(render_acceptance("junit", told))[0]
+    assert suite.get("failures") == "1"
+    (failed,) = [case for case in suite if case.find("failure") is not None]
+    assert "multirotor/position/latency or multirotor/position/lever_arm" in failed.get("name", "")
+    results = json.loads(render_acceptance("sarif", told))["runs"][0]["results"]
+    (said,) = [one["message"]["text"] for one in results if one["ruleId"] == "one_of"]
+    (line,) = [one for one in render_acceptance("github", told).splitlines() if "one_of::" in one]
+    for text in (said, line, render_acceptance("markdown", told), render_acceptance("html", told)):
+        assert "at least one of these is broken" in text
+        assert re.search(r"position lever arm \W*500\Wmm", text)
+        assert "plan" in text
 
 
 @pytest.mark.parametrize(("size_s", "open_too"), [(0.02, True), (1e-5, False)])
@@ -276,8 +376,10 @@ def test_what_holds_has_an_interval_that_what_is_undone_lies_in(
     assert (row.measured.low, row.measured.high) == (-0.06, 0.06)
 
 
-def test_what_others_do_together_in_its_place_breaks_nothing(found: Diagnosis) -> None:
-    """A ranging delay beside an arm would do as well as the delay found: none of them is said."""
+def test_what_others_do_together_in_its_place_is_of_its_group(
+    found: Diagnosis, short: Path
+) -> None:
+    """A ranging delay beside an arm would do as well as the delay found: none is said alone."""
     case = load(EXAMPLE)
     verdict = check_loaded(case, CheckSettings(monte_carlo=False))
     (late,) = [f for f in found.findings if f.effect == "latency"]
@@ -290,6 +392,10 @@ def test_what_others_do_together_in_its_place_breaks_nothing(found: Diagnosis) -
     doubted = (("position", "latency"), ("ranging", "latency"), ("ranging", "lever_arm"))
     assert [rows[one].status for one in doubted] == ["not_shown"] * 3
     assert rows["position", "lever_arm"].status == "holds"
+    told = seen_as(found, short, instead=sight.instead)
+    assert told.exit_code == 1
+    (group,) = told.groups
+    assert set(group.rows) == {f"multirotor/{role}/{name}" for role, name in doubted}
 
 
 @pytest.mark.parametrize(("low", "status"), [(0.98, "broken"), (0.5, "not_shown")])
@@ -301,7 +407,7 @@ def test_a_bias_that_slower_noise_could_leave_breaks_no_figure(
     verdict = check_loaded(case, CheckSettings(monte_carlo=False))
     part = replace(found.findings[0].parameters["latency_s"], value=0.015, unit="m")
     off = replace(found.findings[0], effect="range_bias", sensor="ranging", also=None,
-                  parameters={"bias_m": part}, kind="cause", material=True)  # fmt: skip
+                  parameters={"bias_m": part}, kind="cause", material=True, aliases=())  # fmt: skip
     ranges = NoiseFactor(1.0, low, 1.05, ("range",))
     split = NoiseFactors((ranges,), (1.0,), (0.02, 0.001, 0.001))
     one = next(a for a in assumptions(case, verdict) if (a.role, a.name) == ("ranging", "noise"))

@@ -319,7 +319,7 @@ OTHER_MEANING = {"lever_arm", "sound_speed"}
 ASSUMPTIONS = {"latency", "mounting"}
 SPEAK_OF_ASSUMPTIONS = {
     "assumptions.py", "by_log.py", "by_shift.py", "acceptance.py", "instead.py", "sarif.py",
-    "stretches.py", "undone.py",
+    "stretches.py", "suspects.py", "undone.py",
 }  # fmt: skip
 
 

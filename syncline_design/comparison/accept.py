@@ -17,16 +17,19 @@ from syncline_design.comparison.acceptance import (
     AcceptedSpec,
     AssumptionName,
     AssumptionResult,
+    OneOfThese,
     worst,
 )
 from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_clock import Resting, by_clock
 from syncline_design.comparison.by_log import LogEvidence, by_log
 from syncline_design.comparison.by_stamps import by_stamps
+from syncline_design.comparison.departing import Departing
 from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_files
 from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.comparison.stamp_meaning import held_against
+from syncline_design.comparison.suspects import grouped
 from syncline_design.diagnosis.built import sighted
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
@@ -76,11 +79,13 @@ def accept(
     rests_on = [one for one in assumptions(case, verdict) if one.name in settings.asked]
     evidence = _evidence(case, files, settings, rests_on, seed)
     in_force().doing("weighing the evidence")
-    rows = tuple(_row(case, one, evidence) for one in rests_on)
+    single = tuple(_row(case, one, evidence) for one in rests_on)
+    rows, groups = _in_groups(case, single, assumptions(case, verdict), evidence)
     sound = verdict.verdict == "meets"
+    broken_by = tuple(_broken_by(sound, rows, groups))
     return Acceptance(
-        verdict=worst(row.status for row in rows) if sound else "broken",
-        broken_by=tuple(_broken_by(sound, rows)),
+        verdict="broken" if broken_by else worst(row.status for row in rows),
+        broken_by=broken_by,
         spec=AcceptedSpec(verdict.name, verdict.file, verdict.verdict),
         asked=settings.asked,
         assumptions=rows,
@@ -88,7 +93,22 @@ def accept(
         notes=tuple(_notes(verdict, evidence)),
         version=__version__,
         seed=seed,
+        groups=groups,
     )
+
+
+def _in_groups(
+    case: Case, rows: tuple[AssumptionResult, ...], every: Sequence[Assumed], evidence: _Evidence
+) -> tuple[tuple[AssumptionResult, ...], tuple[OneOfThese, ...]]:
+    """Rows with their groups, and the groups; every: all that the verdict rests on."""
+    log = evidence.log
+    if log is None:
+        return rows, ()
+
+    def rows_of(part: Departing) -> tuple[str, ...]:
+        return tuple(f"{a.stage}/{a.role}/{a.name}" for a in every if log.breaks(a, part))
+
+    return grouped(case, rows, log.in_doubt, rows_of)
 
 
 def _evidence(
@@ -120,11 +140,13 @@ def _diagnosed(
     return LogEvidence.of(sight, paper, case.stages[-1].choice.name, _clocks(case, rests_on))
 
 
-def _broken_by(sound: bool, rows: Sequence[AssumptionResult]) -> Iterator[str]:
+def _broken_by(
+    sound: bool, rows: Sequence[AssumptionResult], groups: Sequence[OneOfThese]
+) -> Iterator[str]:
     if not sound:
         yield "spec"
-    broken = [row for row in rows if row.status == "broken"]
-    yield from (f"{row.stage}/{row.role}/{row.assumption}" for row in broken)
+    yield from (row.name for row in rows if row.status == "broken")
+    yield from (" or ".join(one.rows) for one in groups)
 
 
 def _clocks(case: Case, rests_on: Sequence[Assumed]) -> dict[str, str]:

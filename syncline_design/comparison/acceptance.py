@@ -44,7 +44,9 @@ class AssumptionResult(Record):
     noise); None where the spec says none.  line, column: where the spec says it.
     from_s, to_s: the stamps between which the departure stands out, where it is a part of the log.
     least_stretch_s: the shortest stretch of the log that a row speaks about that holds: what turns
-    the verdict would have shown wherever it had acted so long.
+    the verdict would have shown wherever it had acted so long.  one_of: the number of the group of
+    rows of which one is broken that it is in; its status is then not_shown, and measured what it
+    would be.
     """
 
     stage: str
@@ -60,6 +62,51 @@ class AssumptionResult(Record):
     from_s: float | None = optional()
     to_s: float | None = optional()
     least_stretch_s: float | None = optional()
+    one_of: int | None = optional()
+
+    @property
+    def name(self) -> str:
+        """`stage/role/assumption`."""
+        return f"{self.stage}/{self.role}/{self.assumption}"
+
+
+@dataclass(frozen=True, slots=True)
+class SuspectedDeparture(Record):
+    """One departure of a way, and the rows that it would break; none where no row asks for it, as
+    of an error of the survey that the log is held against."""
+
+    effect: str
+    sensors: tuple[str, ...]
+    stage: str
+    rows: tuple[str, ...]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SuspectedWay(Record):
+    """Departures that together explain what was found; probability: its odds among the others of
+    its finding, where each is one departure alone."""
+
+    departures: tuple[SuspectedDeparture, ...]
+    probability: float | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class OneOfThese(Record):
+    """Rows of which at least one is broken, where the log cannot tell which.
+
+    rows: `stage/role/assumption`, what to look at first before the others; ways: what explains the
+    findings, of each its own ones; evidence: what was found; look_first: at what, in words.
+    tell_apart: the command that looks for the drive that tells the first from another; None where
+    no drive does.
+    """
+
+    number: int
+    rows: tuple[str, ...]
+    ways: tuple[SuspectedWay, ...]
+    evidence: str
+    look_first: str
+    tell_apart: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +133,8 @@ class Acceptance(Record):
     """The outcome: `broken` wins over `not_shown`; a spec that fails on paper is broken as well.
 
     asked: the assumptions that were asked for, which alone are listed.  broken_by: what makes it
-    broken, `spec` for a spec that fails on paper, else stage/role/assumption.
+    broken, `spec` for a spec that fails on paper, else stage/role/assumption, of a group of which
+    one is broken all, with ` or ` between them.  groups: these.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -99,6 +147,7 @@ class Acceptance(Record):
     notes: tuple[str, ...]
     version: str
     seed: int
+    groups: tuple[OneOfThese, ...] = ()
 
     @property
     def exit_code(self) -> int:

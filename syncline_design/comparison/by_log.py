@@ -5,13 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field, replace
+from functools import cached_property
 from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_motion import CODES, by_motion
-from syncline_design.comparison.by_shift import by_shifts, shifts, widened
-from syncline_design.comparison.by_stretch import SPOKEN_OF, InStretches, amount
+from syncline_design.comparison.by_shift import (
+    by_shifts,
+    delay_made,
+    delay_turns,
+    shifts,
+    widened,
+)
+from syncline_design.comparison.by_stretch import SPOKEN_OF, InStretches
+from syncline_design.comparison.departing import (
+    Departing,
+    amount,
+    figure_of,
+    of_finding,
+    of_joint,
+    of_others,
+    of_rival,
+)
+from syncline_design.comparison.in_doubt import InDoubt, Way, likeliest
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.built import Sighted
@@ -19,7 +36,6 @@ from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.noise_split import NoiseFactors
 from syncline_design.diagnosis.result import (
     Diagnosis,
-    Estimate,
     Finding,
     Smallest,
 )
@@ -39,7 +55,7 @@ _BIAS: Final = "bias_m"  # the parameter of a range that is off by a constant
 LONGEST_S: Final = 4 * 3600.0  # of a drive that one would ask for
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class LogEvidence:
     """What a log says: its diagnosis, and what departures do to the spec's verdict.
 
@@ -75,18 +91,71 @@ class LogEvidence:
         known = self.sight.instead if self.sight is not None else ()
         return next((each.others for each in known if each.found == own), ())
 
+    @cached_property
+    def in_doubt(self) -> tuple[InDoubt, ...]:
+        """What it shows beyond doubt, and explains in several ways."""
+        causes = (f for f in self.found.findings if f.material and f.kind == "cause")
+        told = [each for f in causes if (each := self._several(f)) is not None]
+        return (*told, *self.parts.in_doubt())
+
+    def _several(self, finding: Finding) -> InDoubt | None:
+        """A finding with all that would do in its place; None where nothing does."""
+        ways = [Way((of_finding(finding),), finding.probability)]
+        kept = of_others(finding)  # rivals are those of the sensor that it is named by
+        ways += [Way((of_rival(a), *kept), a.probability) for a in finding.aliases]
+        named = (finding.effect, finding.sensor, finding.stage)
+        known = self.sight.instead if self.sight is not None else ()
+        for each in known:
+            if each.found == named:
+                ways.append(Way(tuple(of_joint(one, each.figures) for one in each.others)))
+        if len(ways) < 2 or any(e not in registry() for way in ways for e in way.effects):
+            return None
+        slow = any(self._is_slow(part) for way in ways for part in way.parts)
+        return InDoubt(finding.sentence, tuple(ways), finding.from_s, finding.to_s, finding, slow)
+
+    def breaks(self, one: Assumed, part: Departing) -> bool:
+        """Whether a departure would break this assumption, or make a delay that does."""
+        if self.is_of(part.effect, part.sensors, part.stage, one):
+            return True
+        delay = delay_made(one, part, self.found.log.duration_s)
+        return delay is not None and delay_turns(one, delay, self.paper)
+
+    def figure(self, one: Assumed, part: Departing) -> MeasuredFigure | None:
+        """What a departure that breaks it would make of an assumption's figure."""
+        if self.is_of(part.effect, part.sensors, part.stage, one):
+            return figure_of(one, part.parameters)
+        return delay_made(one, part, self.found.log.duration_s)
+
+    def ways_of(self, one: Assumed, each: InDoubt) -> list[Way]:
+        """The ways that would break an assumption."""
+        return [way for way in each.ways if any(self.breaks(one, part) for part in way.parts)]
+
+    def may_be(self, one: Assumed, each: InDoubt) -> bool:
+        """Whether some of the ways break an assumption, and others do not."""
+        return 0 < len(self.ways_of(one, each)) < len(each.ways)
+
+    def is_sure(self, one: Assumed, finding: Finding) -> bool:
+        """Whether a finding breaks an assumption, in whatever way it is explained."""
+        mine = next((each for each in self.in_doubt if each.finding is finding), None)
+        return mine is None or len(self.ways_of(one, mine)) == len(mine.ways)
+
     def within_figure(self, one: Assumed, finding: Finding) -> bool:
+        """Whether a finding is a constant that a sensor's figure leaves to slower noise."""
+        return one.name == "noise" and self._is_slow(of_finding(finding))
+
+    def _is_slow(self, part: Departing) -> bool:
         """Whether a constant of a reading is no more than its figure leaves to noise that is slower
         than the log: |b| <= 1.96 sigma sqrt(1 - f^2), f the least factor that the log itself shows.
         """
-        own = self.split(one)
-        bias = finding.parameters.get(_BIAS)
-        if own is None or bias is None or one.name != "noise":
+        bias = part.parameters.get(_BIAS)
+        known = {} if self.sight is None else self.sight.factors
+        own = known.get(f"{part.stage}/{part.sensors[0]}")
+        if own is None or bias is None or registry()[part.effect].breaks != "noise":
             return False
-        part = next((f for f in own.parts if f.readings[:1] in ((), ("range",))), None)
-        if part is None:
+        part_of = next((f for f in own.parts if f.readings[:1] in ((), ("range",))), None)
+        if part_of is None:
             return False
-        slower = math.sqrt(max(1.0 - part.low**2, 0.0)) * own.sigma[0]
+        slower = math.sqrt(max(1.0 - part_of.low**2, 0.0)) * own.sigma[0]
         return abs(float(bias.value)) <= NORMAL_95 * slower
 
     def split(self, one: Assumed) -> NoiseFactors | None:
@@ -113,17 +182,22 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     breaking = [f for f in large if not log.within_figure(one, f)]
     if large and not breaking:
         return Judgement("not_shown", _as_slow(large), _noise_figure(one, log))
-    unsure = _whose_noise(one, log, breaking) or _instead(log, breaking)
+    unsure = _whose_noise(one, log, breaking)
     if unsure is not None:
         return unsure
     standing = log.parts.standing(one)
+    suspect = _suspect(one, log)
+    breaking = [f for f in breaking if log.is_sure(one, f)]
     if breaking or (standing is not None and standing.status == "broken"):
         said = _broken(one, breaking, standing, _noise_figure(one, log), _readings(log.split(one)))
         undone = list(log.parts.undone(one, _width(said.measured)))
         return _but_for(said, undone, log.parts.room_undone(one), one.name == "latency")
-    shifted = by_shifts(one, shifts(one, log.found), log.paper)
+    moved = [each for each in shifts(one, log.found) if log.is_sure(one, each.finding)]
+    shifted = by_shifts(one, moved, log.paper)
     if shifted is not None and shifted.status == "broken":
         return shifted
+    if suspect is not None:
+        return suspect
     doubt = _doubt(one, log)
     if doubt:
         return Judgement("not_shown", doubt)
@@ -137,16 +211,22 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     return _nothing_found(one, log)
 
 
-def _instead(log: LogEvidence, breaking: Sequence[Finding]) -> Judgement | None:
-    """What others together would do as well in its place, where that is so of all that breaks."""
-    words = []
-    for finding in breaking:
-        others = log.others_of(finding)
-        if not others:
-            return None
-        told = " with ".join(f"{name} ({sensor})" for name, sensor, _ in others)
-        words.append(f"{finding.sentence}, or {told} in its place")
-    return _untold(words) if words else None
+def _suspect(one: Assumed, log: LogEvidence) -> Judgement | None:
+    """What was found and may be this or something else, with the figure that it would have."""
+    own = {k: each for k, each in enumerate(log.in_doubt) if log.may_be(one, each)}
+    if not own:
+        return None
+    figures = [
+        (way.probability, log.figure(one, part))
+        for each in own.values() for way in each.ways for part in way.parts
+        if log.breaks(one, part)
+    ]  # fmt: skip
+    first = next(iter(own.values()))
+    words = "; ".join(each.words_of(log.ways_of(one, each)) for each in own.values())
+    said = Judgement("not_shown", words, likeliest(figures), first.from_s, first.to_s,
+                     in_doubt=tuple(own))  # fmt: skip
+    undone = list(log.parts.undone(one, _width(said.measured)))
+    return _but_for(said, undone, log.parts.room_undone(one), one.name == "latency")
 
 
 def _untold(words: Sequence[str]) -> Judgement:
@@ -210,7 +290,7 @@ def _broken(
         return also
     first = max(breaking, key=lambda f: f.size_m or 0.0)
     words = "; ".join([*(_said(f) for f in breaking), *([also.words] if also else [])])
-    figure = _figure(one, first)
+    figure = figure_of(one, first.parameters)
     if one.name == "noise" and noise is not None:
         figure = noise
         words += (f"; {to_digits(noise.value or 0.0, 3)} times{where}, where the interval counts "
@@ -243,44 +323,13 @@ def _said(finding: Finding) -> str:
 def _immaterial(one: Assumed, own: Sequence[Finding], paper: OnPaper) -> Judgement:
     """Departures that do not matter on this log: they hold unless they turn the verdict."""
     first = max(own, key=lambda f: f.size_m or 0.0)
-    words, figure = "; ".join(f.sentence for f in own), _figure(one, first)
+    words, figure = "; ".join(f.sentence for f in own), figure_of(one, first.parameters)
     if paper.turned_by(own):
         return Judgement("broken", f"small, and it turns the verdict: {words}", figure)
     if paper.sound and not paper.keeps_slight:
         said = f"immaterial alone, but with all that was found the verdict turns: {words}"
         return Judgement("broken", said, figure)
     return Judgement("holds", f"immaterial: {words}", figure)
-
-
-def _figure(one: Assumed, finding: Finding) -> MeasuredFigure | None:
-    """A finding's size with its interval; of several components, of their root sum of squares.
-
-    None where the parameters are not in the assumption's unit, nor of noise its factor: degrees of
-    freedom are none.
-    """
-    if one.unit == "1":
-        factor = finding.parameters.get("factor")
-        if factor is None:
-            return None
-        return MeasuredFigure(float(factor.value), *(factor.interval95 or (None, None)))
-    parts = [p for p in finding.parameters.values() if _fits(p, one.unit)]
-    values = [float(p.value) for p in parts]
-    if not parts or len(parts) < len(finding.parameters):
-        return None
-    if len(values) == 1:
-        low, high = parts[0].interval95 or (None, None)
-        return MeasuredFigure(values[0], low, high)
-    ends = [p.interval95 for p in parts]
-    if any(end is None for end in ends):
-        return MeasuredFigure(math.hypot(*values))
-    spans = [end for end in ends if end is not None]
-    least = math.hypot(*(0.0 if a <= 0.0 <= b else min(abs(a), abs(b)) for a, b in spans))
-    most = math.hypot(*(max(abs(a), abs(b)) for a, b in spans))
-    return MeasuredFigure(math.hypot(*values), least, most)
-
-
-def _fits(part: Estimate, unit: str) -> bool:
-    return not isinstance(part.value, str) and part.unit == unit
 
 
 def _doubt(one: Assumed, log: LogEvidence) -> str:

@@ -12,7 +12,7 @@ from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
-from syncline_design.comparison.by_stretch import amount
+from syncline_design.comparison.departing import Departing, amount, of_finding
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.result import Diagnosis, Estimate, Finding
@@ -37,20 +37,37 @@ def shifts(one: Assumed, found: Diagnosis) -> list[StampDelay]:
         return []
     own = [f for f in found.findings if f.stage == one.stage and _moves(f)]
     whose = [f for f in own if one.role in (f.sensor, *(f.also or ()))]
-    return [StampDelay(f, _delay(f, found.log.duration_s)) for f in whose]
+    return [StampDelay(f, _delay(of_finding(f), found.log.duration_s)) for f in whose]
 
 
 def _moves(finding: Finding) -> bool:
-    if finding.kind == "stand_in":
-        return False
-    effect = registry()[finding.effect]
+    return finding.kind != "stand_in" and _moves_stamps(finding.effect)
+
+
+def _moves_stamps(name: str) -> bool:
+    effect = registry()[name]
     return effect.breaks in OF_STAMPS and effect.sensitivity is not None  # not jitter: mean zero
 
 
-def _delay(finding: Finding, duration_s: float) -> MeasuredFigure | None:
+def delay_made(one: Assumed, part: Departing, duration_s: float) -> MeasuredFigure | None:
+    """The largest delay that a departure of stamps makes of a sensor's on a log; None: none."""
+    own = one.name == "latency" and one.stage == part.stage and one.role in part.sensors
+    return _delay(part, duration_s) if own and _moves_stamps(part.effect) else None
+
+
+def delay_turns(one: Assumed, delay: MeasuredFigure, paper: OnPaper) -> bool:
+    """Whether a delay of a sensor turns the verdict."""
+    constant = next(
+        e.name for e in registry().values() if any(p.name == LASTING for p in e.parameters)
+    )
+    value = delay.value
+    return value is not None and paper.turned(constant, one.role, one.stage, {LASTING: value})
+
+
+def _delay(departing: Departing, duration_s: float) -> MeasuredFigure | None:
     """stamp = true + rate (t - t0), or + step: the data are as much older than their stamps."""
     for name, lasts in (("rate", duration_s), ("step_s", 1.0)):
-        part = finding.parameters.get(name)
+        part = departing.parameters.get(name)
         if part is not None:
             return _scaled(part, lasts)
     return None
@@ -76,10 +93,7 @@ def _judged(one: Assumed, shift: StampDelay, paper: OnPaper) -> Judgement | None
     if delay is not None and delay.value is not None:
         words = (f"{finding.sentence}: on this log that is a delay of up to "
                  f"{amount(delay.value, 's')}")  # fmt: skip
-        constant = next(
-            e.name for e in registry().values() if any(p.name == LASTING for p in e.parameters)
-        )
-        if paper.turned(constant, one.role, one.stage, {LASTING: delay.value}):
+        if delay_turns(one, delay, paper):
             return Judgement("broken", words, delay, finding.from_s, finding.to_s)
         if finding.material:
             words += ", which does not turn the verdict yet; what else may come is not shown"

@@ -7,16 +7,16 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field
 from typing import Final
 
-from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.departing import amount, figure_of, of_stretch
+from syncline_design.comparison.in_doubt import InDoubt, Way
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.result import Smallest
-from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
+from syncline_design.diagnosis.stretches import OtherFit, ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.sentences import or_rivals
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
 from syncline_design.model.normal import NEARLY_ALL, NORMAL_95
 
@@ -43,22 +43,36 @@ class InStretches:
         said = [j for s in self.found.stands if (j := self._of(s, one)) is not None]
         return next((j for j in said if j.status == "broken"), said[0] if said else None)
 
+    def in_doubt(self) -> Iterator[InDoubt]:
+        """What stands out beyond doubt beside what fits as well; all of it turns the verdict."""
+        for s in self.found.stands:
+            fits = (s, *_in_its_place(s))
+            turning = all(
+                self.paper.turned(f.label[0], f.label[1], f.stage, _values(f)) for f in fits
+            )
+            if s.sure and len(fits) > 1 and turning:
+                ways = tuple(Way((of_stretch(fit),)) for fit in fits)
+                said = f"{of_stretch(s).words} stands out {_placed(s)}"
+                yield InDoubt(said, ways, s.from_s, s.to_s)
+
     def _of(self, s: Stands, one: Assumed) -> Judgement | None:
         name, sensor, _ = s.label
         own = self.is_of(name, (sensor,), s.stage, one)
-        also = any(self.is_of(other, (by,), s.stage, one) for other, by, _ in s.others)
+        also = any(self.is_of(f.label[0], (f.label[1],), f.stage, one) for f in s.instead)
         if not (own or also) or not self.paper.turned(name, sensor, s.stage, _values(s)):
             return None
-        place = f"from {to_digits(s.from_s, 6)} s to {to_digits(s.to_s, 6)} s"
-        if own and s.sure:
-            rivals = or_rivals(f"{name} ({sensor})" for name, sensor, _ in s.others)
-            words = f"{_amounts(s)} stands out {place}, and would turn the verdict{rivals}"
-            return Judgement("broken", words, _figure(s, one), s.from_s, s.to_s)
+        place = _placed(s)
+        rivals = _in_its_place(s)
+        alone = all(self.is_of(f.label[0], (f.label[1],), f.stage, one) for f in rivals)
+        if own and s.sure and alone:
+            part = of_stretch(s)
+            words = f"{part.words} stands out {place}, and would turn the verdict{_built_in(s)}"
+            return Judgement("broken", words, figure_of(one, part.parameters), s.from_s, s.to_s)
         if s.sure:
             words = f"this log cannot tell it from what stands out {place}: {name} ({sensor})"
         else:
             by_chance = to_digits(math.exp(s.log_p), 1)
-            words = (f"{_amounts(s)} seems to stand out {place}: a sound log shows as much "
+            words = (f"{of_stretch(s).words} seems to stand out {place}: a sound log shows as much "
                      f"anywhere with a chance of {by_chance}; a longer log would tell")  # fmt: skip
         return Judgement("not_shown", words, None, s.from_s, s.to_s)
 
@@ -172,37 +186,23 @@ def _sizes(lengths: Sequence[float], worst: Sequence[ShownSize], at: int) -> Ite
             yield f"in {lasts} from {amount(size, worst[k].unit)} on"
 
 
-def _values(s: Stands) -> dict[str, float]:
+def _in_its_place(s: Stands) -> list[OtherFit]:
+    """What fits as well and can be so for a while, where what was named can."""
+    goes = s.inside and registry()[s.label[0]].passing
+    return [fit for fit in s.instead if registry()[fit.label[0]].passing or not goes]
+
+
+def _built_in(s: Stands) -> str:
+    """What fits there as well, and cannot be so for a while but by coming and going."""
+    rivals = _in_its_place(s)
+    names = [of_stretch(fit).name for fit in s.instead if fit not in rivals]
+    return f" (or {' or '.join(names)}, if that came and went)" if names else ""
+
+
+def _values(s: Stands | OtherFit) -> dict[str, float]:
     return dict(zip(s.parameters, s.values, strict=True))
 
 
-def _amounts(s: Stands) -> str:
-    name, sensor, _ = s.label
-    units = {p.name: p.unit for p in registry()[name].parameters}
-    parts = [amount(v, units[p]) for p, v in zip(s.parameters, s.values, strict=True)]
-    return f"{name} ({sensor}) of {', '.join(parts)}"
-
-
-def _figure(s: Stands, one: Assumed) -> MeasuredFigure | None:
-    """Of several components, their root sum of squares, with that of their intervals' ends."""
-    units = {p.name: p.unit for p in registry()[s.label[0]].parameters}
-    if any(units[p] != one.unit for p in s.parameters):
-        return None
-    ends = [
-        (v - NORMAL_95 * u, v + NORMAL_95 * u) for v, u in zip(s.values, s.spreads, strict=True)
-    ]
-    if len(ends) == 1:
-        return MeasuredFigure(s.values[0], *ends[0])
-    least = math.hypot(*(0.0 if a <= 0.0 <= b else min(abs(a), abs(b)) for a, b in ends))
-    return MeasuredFigure(math.hypot(*s.values), least,
-                          math.hypot(*(max(abs(a), abs(b)) for a, b in ends)))  # fmt: skip
-
-
-def amount(value: float, unit: str) -> str:
-    """Two digits are enough of what is an estimate."""
-    shown = rounded(value, 2)
-    if unit == "s":
-        return format_duration(shown)
-    if unit.startswith("rad"):
-        return f"{to_digits(math.degrees(shown), 2)} deg{unit[3:]}"
-    return f"{to_digits(shown)} {unit}".rstrip()
+def _placed(s: Stands) -> str:
+    """Between which stamps."""
+    return f"from {to_digits(s.from_s, 6)} s to {to_digits(s.to_s, 6)} s"

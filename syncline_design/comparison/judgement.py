@@ -20,6 +20,7 @@ class Judgement:
     """What one piece of evidence says: the status, in words why, and the figure if it has one.
 
     from_s, to_s: the stretch that it is about; least_stretch_s: the shortest that it speaks about.
+    in_doubt: which of what the log shows in several ways it may be, by their order.
     """
 
     status: AssumptionStatus
@@ -28,6 +29,7 @@ class Judgement:
     from_s: float | None = None
     to_s: float | None = None
     least_stretch_s: float | None = None
+    in_doubt: tuple[int, ...] = ()
 
 
 NO_EVIDENCE = Judgement("not_shown", "none of these logs tells of it")

@@ -92,6 +92,17 @@ def _fitted(model: Model, label: Label) -> tuple[Array, Array]:
     return np.zeros(0), np.zeros((0, 0))
 
 
+def fitted_figures(model: Model, label: Label) -> tuple[dict[str, float], dict[str, float]]:
+    """Figures of one effect that move the mean, and their standard uncertainties, by name, SI."""
+    names = [p.name for one in model.acting if one.label == label for p in one.effect.slopes()]
+    values, covariance = _fitted(model, label)
+    spreads = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return (
+        dict(zip(names, map(float, values), strict=True)),
+        dict(zip(names, map(float, spreads), strict=True)),
+    )
+
+
 def _square(values: Array, covariance: Array) -> float:
     """x' C^-1 x: what setting figures to zero costs in squares, the others fitted again."""
     scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))

@@ -11,6 +11,7 @@ import numpy as np
 
 from syncline_design.diagnosis.cancelling import cancelling
 from syncline_design.diagnosis.candidates import EDGE
+from syncline_design.diagnosis.charges import fitted_figures
 from syncline_design.diagnosis.consequence import Weights, rms_m
 from syncline_design.diagnosis.episodes import Episode, episode_effect
 from syncline_design.diagnosis.fitting import Data, Model, Opened, bounds_of
@@ -35,6 +36,7 @@ from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
 from syncline_design.model.figure_text import format_estimate, format_nats, to_places
 from syncline_design.model.known import EffectEntry
+from syncline_design.model.normal import NORMAL_95
 
 Label = tuple[str, str, int]
 Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]
@@ -274,7 +276,8 @@ def _finding(
     log10_p = evidence.log_p / math.log(10.0) if math.isfinite(evidence.log_p) else None
     words = evidence_words(evidence.gain, log10_p)
     lists = (compared.aliases, compared.lookalikes, compared.excluded[:MOST_EXCLUDED])
-    aliases, lookalikes, excluded = (tuple(_rival(view, a) for a in own) for own in lists)
+    wider = _wider(final, label)
+    aliases, lookalikes, excluded = (tuple(_rival(view, a, wider) for a in own) for own in lists)
     where = view.system.stages[label[2]].name
     total = 1.0 + sum(_odds(one) for one in aliases)
     aliases = tuple(replace(one, probability=_odds(one) / total) for one in aliases)
@@ -286,10 +289,37 @@ def _finding(
     )
 
 
-def _rival(view: Scene, alias: Alias) -> Rival:
-    name, sensor, stage = alias.candidate.label
-    where = view.system.stages[stage].name
-    return Rival(name, sensor, where, alias.cosine, alias.loss, alias.possible, alias.refitted)
+def _wider(final: Settled, label: Label) -> float:
+    """Standard uncertainties by the fitted noise that a 95 % interval spans to either side, as of
+    the named effect, whose uncertainty holds in noise of another kind as well."""
+    judged = final.judged.get(label)
+    if judged is None:
+        return NORMAL_95
+    fitted = np.array(list(fitted_figures(final.model, label)[1].values()))
+    seen = fitted > 0.0
+    times = judged.spread[seen] / fitted[seen]
+    return judged.coverage * max(1.0, float(np.max(times, initial=1.0)))
+
+
+def _rival(view: Scene, alias: Alias, wider: float) -> Rival:
+    candidate = alias.candidate
+    where = view.system.stages[candidate.stage].name
+    found = {
+        p.name: _of_rival(alias.values[p.name], alias.spreads[p.name], wider, p.unit)
+        for p in candidate.effect.parameters
+        if p.name in alias.values
+    }
+    return Rival(
+        candidate.effect.name, candidate.sensor, where, alias.cosine, alias.loss, alias.possible,
+        alias.refitted, parameters=found or None,
+    )  # fmt: skip
+
+
+def _of_rival(value: float, spread: float, wider: float, unit: str) -> Estimate:
+    if spread <= 0.0:
+        return estimate(value, math.inf, unit, seen=False)
+    half = wider * spread
+    return estimate(value, half / NORMAL_95, unit, interval95=(value - half, value + half))
 
 
 def _gross(view: Scene, fault: Gross) -> Finding:

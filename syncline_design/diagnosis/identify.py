@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, slopes
-from syncline_design.diagnosis.charges import Charge, charge
+from syncline_design.diagnosis.charges import Charge, charge, fitted_figures
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
 from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.spans import cut_to, cuttable, span_of
@@ -40,6 +40,8 @@ class Alias:
     possible: whether it fits with values that the effect can have.
     refitted: whether it was re-simulated with its noise fitted anew, as evidence is; otherwise the
     figures are of first order, with the named effect's noise, and larger than what a refit leaves.
+    values, spreads: its figures in the named one's place and their standard uncertainties by the
+    fitted noise, where it was refitted.
     """
 
     candidate: Candidate
@@ -48,6 +50,8 @@ class Alias:
     loss: float
     possible: bool = True
     refitted: bool = False
+    values: Mapping[str, float] = field(default_factory=dict)
+    spreads: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def acts_always(self) -> bool:
@@ -161,12 +165,15 @@ def _sorted_out(
             doubt = own.doubt(other)
             loss = _beyond(worse + other.nats - own.nats, doubt) + other.prior - own.prior
             doubt += max(other.borrowed - own.borrowed, 0.0)
+            values, spreads = fitted_figures(model, one.candidate.label)
             one = replace(
                 one,
                 fit=worse,
                 loss=loss,
                 possible=plausible_in_place(data, model, named),
                 refitted=True,
+                values=values,
+                spreads=spreads,
             )
         lists[_place(one, doubt)].append(one)
     aliases, lookalikes, excluded = lists

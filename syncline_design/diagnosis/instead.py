@@ -20,7 +20,7 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Signature, slopes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.slow_states import fitted_of
-from syncline_design.diagnosis.undone import Label, joint_of
+from syncline_design.diagnosis.undone import BUILD, Label, joint_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -29,12 +29,24 @@ Named = tuple[str, str, str]  # effect, sensor, name of the stage
 
 
 @dataclass(frozen=True, slots=True)
+class JointFigure:
+    """A parameter of one of several departures together: its value and standard uncertainty, SI."""
+
+    departure: Named
+    parameter: str
+    value: float
+    spread: float
+
+
+@dataclass(frozen=True, slots=True)
 class InItsPlace:
-    """A departure that was found, and others that would do together in its place."""
+    """A departure that was found, and others that would do together in its place, with which
+    figures."""
 
     found: Named
     others: tuple[Named, ...]
     loss: float
+    figures: tuple[JointFigure, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +70,16 @@ class InQuestion:
             self.saved[key] = 0.5 * float(own @ np.linalg.solve(whole, own)) if at else 0.0
         return self.saved[key]
 
+    def fitted(self, chosen: Collection[int], own: int) -> tuple[Array, Array]:
+        """(N_SS + 1)^-1 g_S of one of the chosen, and standard uncertainties, of what a build can
+        be wrong by."""
+        order = sorted(chosen)
+        at = [c for k in order for c in self.columns[k]]
+        inverse = np.linalg.inv(self.normal[np.ix_(at, at)] + np.eye(len(at)))
+        first = sum(len(self.columns[k]) for k in order if k < own)
+        part = slice(first, first + len(self.columns[own]))
+        return (inverse @ self.score[at])[part], np.sqrt(np.diag(inverse))[part]
+
 
 def in_place(data: Data, model: Model, found: Sequence[Signature]) -> tuple[InItsPlace, ...]:
     """Of every departure that a model holds, others that would do together in its place."""
@@ -75,15 +97,33 @@ def in_place(data: Data, model: Model, found: Sequence[Signature]) -> tuple[InIt
                    joint.normal, joint.score)  # fmt: skip
     names = [stage.name for stage in data.view.system.stages]
     held = {labels.index(one.label) for one in own}
-    return tuple(_each(asked, held, names))
+    return tuple(_each(asked, signed, held, names))
 
 
-def _each(asked: InQuestion, held: Collection[int], names: Sequence[str]) -> Iterator[InItsPlace]:
+def _each(
+    asked: InQuestion, signed: Sequence[Signature], held: Collection[int], names: Sequence[str]
+) -> Iterator[InItsPlace]:
     for k in sorted(held):
-        others = others_in_place(asked, k, frozenset(held) - {k})
+        kept = frozenset(held) - {k}
+        others = others_in_place(asked, k, kept)
         if others is not None:
-            told = tuple(_named(asked.labels[i], names) for i in sorted(others[0]))
-            yield InItsPlace(_named(asked.labels[k], names), told, others[1])
+            some, loss = others
+            told = tuple(_named(asked.labels[i], names) for i in sorted(some))
+            figures = tuple(f for i in sorted(some) for f in
+                            _figures(asked, signed[i], i, kept | some, names))  # fmt: skip
+            yield InItsPlace(_named(asked.labels[k], names), told, loss, figures)
+
+
+def _figures(
+    asked: InQuestion, signature: Signature, own: int, chosen: Collection[int],
+    names: Sequence[str],
+) -> Iterator[JointFigure]:  # fmt: skip
+    values, spreads = asked.fitted(chosen, own)
+    slopes_of = signature.candidate.effect.slopes()
+    for p, value, spread in zip(slopes_of, values, spreads, strict=True):
+        unit = BUILD[p.unit]
+        yield JointFigure(_named(asked.labels[own], names), p.name, unit * float(value),
+                          unit * float(spread))  # fmt: skip
 
 
 def _named(label: Label, names: Sequence[str]) -> Named:

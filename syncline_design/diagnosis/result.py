@@ -68,7 +68,8 @@ class Rival(Record):
 
     possible: whether it fits with values that the effect can have.  refitted: with noise fitted
     anew, as the evidence is; otherwise to first order with the named effect's noise.
-    probability: posterior odds inside the class, of an alias.
+    probability: posterior odds inside the class, of an alias.  parameters: its figures in the named
+    one's place, where it was refitted.
     """
 
     effect: str
@@ -79,6 +80,7 @@ class Rival(Record):
     possible: bool = True
     refitted: bool = True
     probability: float | None = optional()
+    parameters: Mapping[str, Estimate] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,6 +58,7 @@ STREAM: Final = 23  # key of their draws
 SURE: Final = 1e-4  # chance that a sound log has such a window, below which it acts there
 NEARLY_ALL_PLACES: Final = 0.05  # of the windows show less than is told
 AS_GOOD_NATS: Final = 4.5  # within which candidates of a window are not told apart
+EDGE: Final = 0.02  # of a log, within which what stands out may go on beyond its end
 ASKED: Final = ("latency", "lever_arm", "mounting")  # kinds of assumptions
 Label = tuple[str, str, int]
 
@@ -67,7 +68,8 @@ class Stands:
     """A candidate that stands out from one stamp to another.
 
     values and spreads by its parameters; log_p: log of the chance that a sound log shows as much
-    anywhere; sure: whether that is beyond doubt; others: what fits there as well.
+    anywhere; sure: whether that is beyond doubt; instead: what fits there as well.  inside:
+    whether it begins and ends within the log, as what is built in does not.
     """
 
     label: Label
@@ -79,7 +81,24 @@ class Stands:
     spreads: tuple[float, ...]
     log_p: float
     sure: bool
-    others: tuple[Label, ...] = ()
+    instead: tuple[OtherFit, ...] = ()
+    inside: bool = False
+
+    @property
+    def others(self) -> tuple[Label, ...]:
+        """What fits there as well."""
+        return tuple(one.label for one in self.instead)
+
+
+@dataclass(frozen=True, slots=True)
+class OtherFit:
+    """What fits a stretch as well as what is named: its values and spreads by its parameters."""
+
+    label: Label
+    stage: str
+    parameters: tuple[str, ...]
+    values: tuple[float, ...]
+    spreads: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,12 +244,26 @@ def _named(data: Data, model: Model, asked: Sequence[Signature], hit: _Hit) -> S
     best = max(fits, key=lambda each: each.nats)
     as_good = [each for each in fits if each.nats > best.nats - AS_GOOD_NATS]
     named = min(as_good, key=lambda each: _seldom(each.signature.candidate))
-    one = named.signature.candidate
+    own = _told(data, named)
+    others = tuple(_told(data, other) for other in as_good if other is not named)
     return Stands(
-        one.label, data.view.system.stages[one.stage].name, hit.from_s, hit.to_s,
-        tuple(p.name for p in one.effect.slopes()), named.values, named.spreads,
-        hit.log_p, hit.log_p < math.log(SURE),
-        tuple(other.signature.candidate.label for other in as_good if other is not named),
+        own.label, own.stage, hit.from_s, hit.to_s, own.parameters, own.values, own.spreads,
+        hit.log_p, hit.log_p < math.log(SURE), others, _is_inside(data, hit),
+    )  # fmt: skip
+
+
+def _is_inside(data: Data, hit: _Hit) -> bool:
+    time_s = data.view.log.time_s
+    margin_s = EDGE * float(time_s[-1] - time_s[0])
+    first, last = float(time_s[0]), float(time_s[-1])
+    return hit.from_s - first > margin_s and last - hit.to_s > margin_s
+
+
+def _told(data: Data, fit: _Fit) -> OtherFit:
+    one = fit.signature.candidate
+    return OtherFit(
+        one.label, data.view.system.stages[one.stage].name,
+        tuple(p.name for p in one.effect.slopes()), fit.values, fit.spreads,
     )  # fmt: skip
 
 

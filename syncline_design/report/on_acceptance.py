@@ -10,6 +10,8 @@ from syncline_design.comparison.acceptance import (
     AssumptionResult,
     AssumptionStatus,
     MeasuredFigure,
+    OneOfThese,
+    SuspectedWay,
 )
 from syncline_design.report import numbers
 from syncline_design.report.ci import Level, Notice
@@ -35,6 +37,7 @@ _OUTCOMES: Final[dict[AssumptionStatus, tuple[Tone, str, str]]] = {
     "broken": ("bad", "\u2717", "broken"),
     "not_shown": ("warn", "!", "not shown"),
 }
+_ONE_OF: Final[tuple[Tone, str, str]] = ("bad", "?", "one of these")
 _ORDER: Final[tuple[AssumptionStatus, ...]] = ("broken", "not_shown", "holds")
 _LEVELS: Final[dict[AssumptionStatus, Level]] = {
     "holds": "pass",
@@ -60,6 +63,7 @@ def on_acceptance(result: Acceptance) -> Document:
         sections=(
             *section("assumptions", "What the verdict rests on, against the evidence",
                      show(_table(result), silent=True), "Assumptions"),
+            *section("groups", "One of these is broken", _groups(result), "One of these"),
             *section("notes", "What the logs said besides", _notes(result), "Notes"),
             *section("evidence", "Evidence", show(_evidence(result), silent=True)),
             *provenance([("syncline-design", result.version), ("seed", str(result.seed))]),
@@ -72,16 +76,49 @@ def _outcome(result: Acceptance) -> Outcome:
     tone, mark, _ = _OUTCOMES[result.verdict]
     if result.spec.verdict != "meets":
         return Outcome(tone, mark, "The spec does not meet its requirements on paper")
+    if result.groups and not any(row.status == "broken" for row in result.assumptions):
+        return Outcome(tone, mark, "An assumption is broken, and the log cannot tell which")
     return Outcome(tone, mark, _WORDS[result.verdict])
 
 
 def _sentences(result: Acceptance) -> Iterator[str]:
     rows = result.assumptions
-    counts = {s: sum(r.status == s for r in rows) for s in _ORDER}
+    alone = [r.status for r in rows if r.one_of is None]
+    counts = {s: alone.count(s) for s in _ORDER}
     words = {s: _OUTCOMES[s][2] if n == 1 or s != "holds" else "hold" for s, n in counts.items()}
-    told = ", ".join(f"{n} {words[s]}" for s, n in counts.items())
+    of = [f"at least one of {len(one.rows)} broken" for one in result.groups]
+    told = ", ".join([*of, *(f"{n} {words[s]}" for s, n in counts.items())])
     yield f"Of {len(rows)} assumptions of the verdict: {told}."
     yield from (sentence(row) for row in rows if row.status == "broken")
+    for one in result.groups:
+        yield group_sentence(result, one)
+        yield f"Look first at {one.look_first}.{_by_driving(one)}"
+
+
+def _by_driving(group: OneOfThese) -> str:
+    if group.tell_apart is None:
+        return " No drive tells these apart: measure them on the vehicle."
+    return f" The drive that tells it from the others: {group.tell_apart}"
+
+
+def group_sentence(result: Acceptance, group: OneOfThese) -> str:
+    """`at least one of these is broken, and the log cannot tell which: uav position latency, ..`"""
+    rows = {row.name: row for row in result.assumptions}
+    members = [rows[name] for name in group.rows]
+    told = ", ".join(f"{_place(row)}{_if_known(row)}" for row in members)
+    beside = dict.fromkeys(p.text for way in group.ways for p in way.departures if not p.rows)
+    others = f", or no row but {' or '.join(beside)}" if beside else ""
+    return (f"at least one of these is broken, and the log cannot tell which: {told}{others}; of "
+            f"several at once each may be of another size (found: {group.evidence}).")  # fmt: skip
+
+
+def _if_known(row: AssumptionResult) -> str:
+    value = None if row.measured is None else row.measured.value
+    return "" if value is None else f" ({_figure(value, row.unit)})"
+
+
+def _place(row: AssumptionResult) -> str:
+    return f"{row.stage} {row.role} {row.assumption.replace('_', ' ')}"
 
 
 def sentence(row: AssumptionResult) -> str:
@@ -89,9 +126,12 @@ def sentence(row: AssumptionResult) -> str:
     figures = ""
     if row.measured is not None and row.measured.value is not None:
         figures = f"; measured {_measured(row)}, assumed {_figure(row.assumed, row.unit)}"
-    place = f"{row.stage} {row.role} {row.assumption.replace('_', ' ')}"
+    if row.one_of is not None:
+        if figures:
+            figures = f"; it would be {_measured(row)}, assumed {_figure(row.assumed, row.unit)}"
+        return f"{_place(row)} is one of several that may be broken: {row.evidence}{figures}."
     verb = "" if row.status == "holds" else "is "
-    return f"{place} {verb}{_OUTCOMES[row.status][2]}: {row.evidence}{figures}."
+    return f"{_place(row)} {verb}{_OUTCOMES[row.status][2]}: {row.evidence}{figures}."
 
 
 def _figure(value: float | None, unit: str) -> str:
@@ -110,8 +150,8 @@ def _measured(row: AssumptionResult) -> str:
 
 def _table(result: Acceptance) -> Table:
     rows = []
-    for row in sorted(result.assumptions, key=lambda r: _ORDER.index(r.status)):
-        tone, mark, word = _OUTCOMES[row.status]
+    for row in sorted(result.assumptions, key=_first_told):
+        tone, mark, word = _OUTCOMES[row.status] if row.one_of is None else _ONE_OF
         value = None if row.measured is None else row.measured.value
         rows.append((
             Cell(word, None, tone, mark),
@@ -130,6 +170,33 @@ def _table(result: Acceptance) -> Table:
         "Evidence",
     )
     return table("Assumptions", heads, rows)
+
+
+def _first_told(row: AssumptionResult) -> tuple[int, int]:
+    """Broken rows, then those of which one is, by their groups, then the others."""
+    if row.one_of is not None:
+        return 0, row.one_of
+    return _ORDER.index(row.status), 0
+
+
+def _groups(result: Acceptance) -> list[Node]:
+    """What explains what was found, a row a way, the likelier first."""
+    ways = [
+        way for one in result.groups
+        for way in sorted(one.ways, key=lambda each: -(each.probability or 0.0))
+    ]  # fmt: skip
+    heads = ("Would break", "It would be", "Odds #")
+    return [*show(table("One of these", heads, map(_way, ways)), silent=True)]
+
+
+def _way(way: SuspectedWay) -> tuple[Cell, ...]:
+    names = [name.replace("_", " ") for part in way.departures for name in part.rows]
+    odds = "" if way.probability is None else numbers.percent(way.probability, 2)
+    return (
+        Cell(" and ".join(names) or "no row of the spec"),
+        Cell(" with ".join(part.text for part in way.departures)),
+        Cell(odds, way.probability),
+    )
 
 
 def _notes(result: Acceptance) -> list[Node]:
@@ -152,10 +219,19 @@ def acceptance_notices(result: Acceptance) -> list[Notice]:
                row.column, sentence(row))
         for row in result.assumptions
     ]  # fmt: skip
+    found += [_group_notice(result, one) for one in result.groups]
     if result.spec.verdict != "meets":
         text = f"on paper the verdict is {result.spec.verdict}: there is nothing to accept"
         found.insert(0, Notice("fail", "spec", "", file, 1, 1, text))
     return found
+
+
+def _group_notice(result: Acceptance, group: OneOfThese) -> Notice:
+    """At the place of the row to look at first."""
+    first = next(row for row in result.assumptions if row.name == group.rows[0])
+    text = f"{group_sentence(result, group)} Look first at {group.look_first}."
+    return Notice("fail", "one_of", " or ".join(group.rows), result.spec.file, first.line,
+                  first.column, text + _by_driving(group))  # fmt: skip
 
 
 def render_acceptance(name: str, result: Acceptance) -> str:

@@ -41,6 +41,7 @@ _RULES: Final[dict[str, str]] = {
     "clock": "The host's clock keeps its bound.",
     "speed": "The vehicle keeps the spec's v_max.",
     "rate": "The vehicle keeps the spec's omega_max.",
+    "one_of": "None of several assumptions that a log cannot tell apart is broken.",
     "sample_spacing": "Two samples of a ranging sensor are close enough.",
     "failing_share": "Figures within their intervals seldom break a requirement.",
     "feasible": "Every entry can work where it stands.",
