@@ -46,7 +46,7 @@ class InStretches:
     def in_doubt(self) -> Iterator[InDoubt]:
         """What stands out beyond doubt beside what fits as well; all of it turns the verdict."""
         for s in self.found.stands:
-            fits = (s, *_in_its_place(s))
+            fits: list[Stands | OtherFit] = [s, *_in_its_place(s)]
             turning = all(
                 self.paper.turned(f.label[0], f.label[1], f.stage, _values(f)) for f in fits
             )
