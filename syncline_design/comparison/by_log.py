@@ -28,7 +28,7 @@ from syncline_design.comparison.departing import (
     of_others,
     of_rival,
 )
-from syncline_design.comparison.in_doubt import InDoubt, Way, likeliest
+from syncline_design.comparison.in_doubt import InDoubt, OneWay, likeliest
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.built import Sighted
@@ -100,14 +100,14 @@ class LogEvidence:
 
     def _several(self, finding: Finding) -> InDoubt | None:
         """A finding with all that would do in its place; None where nothing does."""
-        ways = [Way((of_finding(finding),), finding.probability)]
+        ways = [OneWay((of_finding(finding),), finding.probability)]
         kept = of_others(finding)  # rivals are those of the sensor that it is named by
-        ways += [Way((of_rival(a), *kept), a.probability) for a in finding.aliases]
+        ways += [OneWay((of_rival(a), *kept), a.probability) for a in finding.aliases]
         named = (finding.effect, finding.sensor, finding.stage)
         known = self.sight.instead if self.sight is not None else ()
         for each in known:
             if each.found == named:
-                ways.append(Way(tuple(of_joint(one, each.figures) for one in each.others)))
+                ways.append(OneWay(tuple(of_joint(one, each.figures) for one in each.others)))
         if len(ways) < 2 or any(e not in registry() for way in ways for e in way.effects):
             return None
         slow = any(self._is_slow(part) for way in ways for part in way.parts)
@@ -126,7 +126,7 @@ class LogEvidence:
             return figure_of(one, part.parameters)
         return delay_made(one, part, self.found.log.duration_s)
 
-    def ways_of(self, one: Assumed, each: InDoubt) -> list[Way]:
+    def ways_of(self, one: Assumed, each: InDoubt) -> list[OneWay]:
         """The ways that would break an assumption."""
         return [way for way in each.ways if any(self.breaks(one, part) for part in way.parts)]
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.departing import amount, figure_of, of_stretch
-from syncline_design.comparison.in_doubt import InDoubt, Way
+from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.result import Smallest
@@ -51,7 +51,7 @@ class InStretches:
                 self.paper.turned(f.label[0], f.label[1], f.stage, _values(f)) for f in fits
             )
             if s.sure and len(fits) > 1 and turning:
-                ways = tuple(Way((of_stretch(fit),)) for fit in fits)
+                ways = tuple(OneWay((of_stretch(fit),)) for fit in fits)
                 said = f"{of_stretch(s).words} stands out {_placed(s)}"
                 yield InDoubt(said, ways, s.from_s, s.to_s)
 

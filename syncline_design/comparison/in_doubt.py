@@ -16,7 +16,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class OneWay:
     """Departures that together are one explanation; probability: its odds among the others."""
 
     parts: tuple[Departing, ...]
@@ -48,13 +48,13 @@ class InDoubt:
     """
 
     found: str
-    ways: tuple[Way, ...]
+    ways: tuple[OneWay, ...]
     from_s: float | None = None
     to_s: float | None = None
     finding: Finding | None = None
     may_be_sound: bool = False
 
-    def words_of(self, own: Sequence[Way]) -> str:
+    def words_of(self, own: Sequence[OneWay]) -> str:
         """What a row is told of it that some of the ways would break."""
         others = " or ".join(way.name for way in self.ways if way not in own)
         mine = " or ".join(way.words for way in own)

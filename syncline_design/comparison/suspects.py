@@ -14,7 +14,7 @@ from syncline_design.comparison.acceptance import (
     SuspectedWay,
 )
 from syncline_design.comparison.departing import Departing
-from syncline_design.comparison.in_doubt import InDoubt, Way
+from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
@@ -37,7 +37,7 @@ _LOOK: Final[Mapping[str, str]] = {
 class _Group:
     """Doubts that share rows, and all rows of theirs."""
 
-    doubts: tuple[tuple[InDoubt, tuple[Way, ...]], ...]
+    doubts: tuple[tuple[InDoubt, tuple[OneWay, ...]], ...]
     rows: frozenset[str]
 
 
@@ -70,7 +70,7 @@ def grouped(
     return tuple(_numbered(row, certain, groups) for row in rows), groups
 
 
-def _is_out(way: Way, rows_of: RowsOf, status: Mapping[str, str]) -> bool:
+def _is_out(way: OneWay, rows_of: RowsOf, status: Mapping[str, str]) -> bool:
     return any(status.get(name) == "holds" for part in way.parts for name in rows_of(part))
 
 
@@ -108,14 +108,16 @@ def _departure(part: Departing, rows_of: RowsOf) -> SuspectedDeparture:
     return SuspectedDeparture(part.effect, part.sensors, part.stage, rows_of(part), part.words)
 
 
-def _rank(name: str, ways: Sequence[Way], rows_of: RowsOf) -> tuple[float, int]:
+def _rank(name: str, ways: Sequence[OneWay], rows_of: RowsOf) -> tuple[float, int]:
     """The likelier first, of those alike what is met more often."""
     own = [(way, p) for way in ways for p in way.parts if name in rows_of(p)]
     likely = max(way.probability or 0.0 for way, _ in own)
     return -round(likely, 2), min(registry()[part.effect].rarity for _, part in own)
 
 
-def _command(case: Case, order: Sequence[str], ways: Sequence[Way], rows_of: RowsOf) -> str | None:
+def _command(
+    case: Case, order: Sequence[str], ways: Sequence[OneWay], rows_of: RowsOf
+) -> str | None:
     """Looks for the drive that tells the first row from the next that a drive can tell it from."""
     parts = {name: next(_parts_of(name, ways, rows_of), None) for name in order}
     first = parts[order[0]]
@@ -128,7 +130,7 @@ def _command(case: Case, order: Sequence[str], ways: Sequence[Way], rows_of: Row
     return None
 
 
-def _parts_of(name: str, ways: Sequence[Way], rows_of: RowsOf) -> Iterator[Departing]:
+def _parts_of(name: str, ways: Sequence[OneWay], rows_of: RowsOf) -> Iterator[Departing]:
     for way in sorted(ways, key=lambda one: len(one.parts)):
         for part in way.parts:
             if name in rows_of(part) and registry()[part.effect].sensitivity is not None:
