@@ -95,6 +95,41 @@ def test_points_without_time_and_with_none_that_is_finite(tmp_path: Path) -> Non
     assert any("1 steps back" in note for note in stream.notes)
 
 
+@pytest.mark.parametrize("at", [0.2, 0.7])
+def test_damage_that_ends_the_process_of_its_library_ends_none_here(
+    tmp_path: Path, at: float
+) -> None:
+    """lazrs reads outside its memory in such layers: its own process dies, this one says so."""
+    import subprocess
+    import sys
+
+    path = cloud(tmp_path / "a.laz", np.sort(np.random.default_rng(1).uniform(0, 6e5, 3000)))
+    whole = path.read_bytes()
+    begins = int(at * len(whole))
+    path.write_bytes(whole[:begins] + b"\xff" * 3000 + whole[begins + 3000 :])
+    code = "import laspy, sys; laspy.open(sys.argv[1]).read_points(3000)"
+    alone = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True)
+    assert alone.returncode < 0  # else the library was mended, and the probe may go
+    with pytest.raises(BadInput, match="the library that unpacks its points crashes there"):
+        open_recording(path).streams()
+
+
+def test_what_unpacks_before_a_crash_is_read(tmp_path: Path) -> None:
+    """The chunk behind 50 000 points is damaged; those of the first are read and are the same."""
+    times = np.sort(np.random.default_rng(2).uniform(0, 6e5, 60_000))
+    path = cloud(tmp_path / "a.laz", times)
+    expected = stamps_of(only(open_recording(path)))
+    whole = path.read_bytes()
+    begins = int(0.84 * len(whole))
+    path.write_bytes(whole[:begins] + b"\xff" * 3000 + whole[begins + 3000 :])
+    recording = open_recording(path)
+    stream = only(recording)
+    assert (stream.partial, stream.messages) == (True, 50_000)
+    assert stamps_of(stream) == expected[:50_000]
+    assert recording.incomplete is not None
+    assert "crashes there" in recording.incomplete.reason
+
+
 @pytest.mark.parametrize("name", ["a.las", "a.laz"])
 def test_a_cut_cloud_is_read_up_to_its_cut(tmp_path: Path, name: str) -> None:
     rng = np.random.default_rng(3)
@@ -359,3 +394,11 @@ def test_pcapng_is_read_too_and_its_absurd_times_are_unset(tmp_path: Path) -> No
     assert stream.stamps is not None
     assert stream.stamps.secondary_ns is not None
     assert stream.stamps.secondary_ns[0] == UNSET
+
+
+def test_a_pipe_in_place_of_metadata_is_not_waited_for(tmp_path: Path) -> None:
+    import os
+
+    path = capture(tmp_path / "run.pcap", [(Decimal(5), udp(legacy(5 * SECOND, 1, 9, 0), 7502))])
+    os.mkfifo(tmp_path / "run.json")
+    assert only(open_recording(path)).messages == 1

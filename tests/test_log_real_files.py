@@ -103,6 +103,10 @@ FACTS: dict[str, tuple[int, dict[str, Fact]]] = {  # streams, and facts of some
     "nmea/ac12.log": (6, {
         "GPRMC": Fact("utc", 7, utc("2007-12-23T19:32:21"), utc("2007-12-23T19:32:27")),
     }),
+    "nmea/trimble_nmea.log": (16, {
+        "PTNLAVR": Fact("utc", 2), "PTNLDG": Fact("unknown", 2), "PGPPADV": Fact("unknown", 2),
+        "PTNLGGK": Fact("utc", 1, utc("2010-05-19T10:29:39"), utc("2010-05-19T10:29:39")),
+    }),
     "ubx/SF-calibration.log": (9, {
         "NAV-PVAT": Fact("gps", 527, week(2415, 136153), week(2415, 136679)),
         "NAV-ATT": Fact("gps", 527, week(2415, 136153), week(2415, 136679)),
@@ -228,6 +232,7 @@ def test_counts_of_whole_logs() -> None:
         **{"nmea/gp-320fw_overflow.log": 141, "nmea/gp-320fw_coldboot.log": 86},
         **{"nmea/skytraq-dgps.log": 1024, "nmea/ublox-zed-f9p-nmea.log": 1015},
         **{"nmea/sounder.log": 244, "nmea/tnt-revolution.log": 60, "nmea/ac12.log": 51},
+        "nmea/trimble_nmea.log": 21,
         **{"ubx/SF-calibration.log": 1621, "ubx/mon_span.ubx": 109, "ubx/ublox-8-time.log": 284},
         "ubx/serial-COM3.ubx": 951 + 27,  # and the commands sent (CFG-VALSET), which are valid too
         **{"ubx/ublox-zed-f9p-hp.log": 293, "ubx/ubx_20080526.ubx": 3647},

@@ -29,6 +29,7 @@ from syncline_design.logs.readers.epochs import (
 )
 from syncline_design.logs.readers.las_header import MAGIC, TIMED, LasClaims, claims_of
 from syncline_design.logs.readers.laz_cut import mended, whole_points
+from syncline_design.logs.readers.laz_probe import CRASH, sound_points
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader, library
 from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
@@ -56,6 +57,7 @@ class LasRecording(BatchRecording):
         self._laspy = library("laspy", path, FORMAT)
         if self._claims.packed:
             library("lazrs", path, FORMAT)
+        self.sound: int | None = None  # points that unpack without harm, once that was tried
         self._adjusted: bool | None = None  # what the values say
         self._not_finite = 0
         self._back = 0
@@ -66,7 +68,7 @@ class LasRecording(BatchRecording):
         timed = self._claims.point_format in TIMED
         count = unknown = back = 0
         last = -np.inf
-        for points in self._clouds():
+        for points in self.clouds():
             stamps = None
             if timed:
                 times = np.asarray(points.gps_time, dtype=float)
@@ -86,10 +88,14 @@ class LasRecording(BatchRecording):
             raise refuse(self.path, "no point in the cloud")
         self._not_finite, self._back = unknown, back
 
-    def _clouds(self) -> Iterator[Any]:
+    def clouds(self) -> Iterator[Any]:
         """Points, up to the last that can be read."""
         claims, there = self._claims, self._there()
-        rows, count, said = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record)), 0, ""
+        if self.sound is None:
+            self.sound = sound_points(self.path, there) if claims.packed else there
+        said = "" if self.sound >= there else CRASH
+        there = min(there, self.sound)
+        rows, count = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record)), 0
         while rows and count < there:
             try:
                 for points in self._from(count, there, rows):
@@ -207,6 +213,16 @@ class LasRecording(BatchRecording):
         if self._back:
             said.append(f"points are not in the order of their times: {self._back} steps back")
         return tuple(said)
+
+
+def tell(path: Path) -> None:
+    """Print the number of points after every piece that unpacks (for `laz_probe`)."""
+    recording = LasRecording(path)
+    recording.sound = sys.maxsize
+    count = 0
+    for points in recording.clouds():
+        count += len(points)
+        print(count, flush=True)
 
 
 @contextmanager

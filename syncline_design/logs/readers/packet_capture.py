@@ -375,6 +375,8 @@ def _address(raw: bytes) -> str:
 def _timestamp_mode(path: Path) -> str:
     """Of an Ouster's metadata beside the capture; empty where there is none."""
     beside = path.with_suffix(".json")
+    if not beside.is_file():  # a pipe would be waited for
+        return ""
     try:
         with beside.open("rb") as file:
             found = MODE.search(file.read(1 << 20))
