@@ -150,7 +150,7 @@ def diagnosed() -> Page:
         "98.1\u00a0%",
         "2\u00a0987 of 3\u00a0000",
         "missing values",
-        "283\u00a0mm",
+        "28.3\u00a0cm",
         "along, speed 6.2\u00a0m/s to 9\u00a0m/s: mean \u221265.2\u00a0cm, 508 standard errors",
         "Told apart on this log from filter lag (position), 141\u00a0nat worse",
         "boresight: the vehicle never tilted",
