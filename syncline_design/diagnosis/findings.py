@@ -24,6 +24,7 @@ from syncline_design.diagnosis.noise import (
     marginal_variance,
     precision,
 )
+from syncline_design.diagnosis.one_value import Uneven
 from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch, readings_words
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.search import VARIES
@@ -34,7 +35,7 @@ from syncline_design.diagnosis.unlike_readings import Unlike, factor_effect
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
-from syncline_design.model.figure_text import format_estimate, format_nats, to_places
+from syncline_design.model.figure_text import format_estimate, format_nats, percent, to_places
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.normal import NORMAL_95
 
@@ -284,9 +285,21 @@ def _finding(
     rivals = (aliases, lookalikes, excluded)
     values = tuple((name, e.value) for name, e in found.items())
     material = weights.material(size_m, EffectEntry(effect.name, label[1], where, values))
-    return finding(
+    named = finding(
         effect, label[1], where, found, words, evidence.gain, log10_p, rivals, material, size_m
     )
+    return _uneven(named, final.uneven.get(label))
+
+
+def _uneven(named: Finding, found: Uneven | None) -> Finding:
+    """The finding, a stand-in where it is not one value wherever the vehicle goes."""
+    if found is None or named.kind != "cause":
+        return named
+    changes = (
+        f"it changes with the {found.covariate.replace('_', ' ')}, by {percent(found.share, 2)} of "
+        "itself over a standard deviation of that, so it stands for something else"
+    )
+    return replace(named, kind="stand_in", sentence=f"{named.sentence}; {changes}")
 
 
 def _wider(final: Settled, label: Label) -> float:

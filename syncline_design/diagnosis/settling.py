@@ -15,6 +15,7 @@ from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.identify import Comparison, competed
 from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.noise import as_specified
+from syncline_design.diagnosis.one_value import Uneven, uneven_effects
 from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted_of, names_of
 from syncline_design.diagnosis.step_form import refuted_steps
 from syncline_design.diagnosis.tails import tails_in
@@ -46,8 +47,9 @@ class Settled:
 
     judged: what noise that is not the model's lets be said of each effect that moves the mean.
     courses: how it runs along the log.  stairs: the model with the strongest effect alone, the
-    strongest two, ... , all of them.  refuted: steps that the data want to be ramps.  wandering:
-    effects that are another size every few seconds.
+    strongest two, ... , all of them.  refuted: steps that the data want to be ramps.  uneven:
+    effects that are no one value wherever the vehicle goes.  wandering: effects that are another
+    size every few seconds.
     """
 
     data: Data
@@ -58,6 +60,7 @@ class Settled:
     courses: Mapping[Label, Course | None]
     stairs: tuple[tuple[Label, Model], ...]
     refuted: frozenset[Label] = frozenset()
+    uneven: Mapping[Label, Uneven] = field(default_factory=dict)
     wandering: Mapping[Label, Wandering] = field(default_factory=dict)
 
 
@@ -94,8 +97,10 @@ def settle(
     judged = dict(zip((a.label for a in model.acting), own, strict=True))
     ran = zip((a.label for a in model.acting), states.courses_of(model), strict=True)
     stairs = _stairs(data, model, evidence)
-    refuted = refuted_steps(states, model)
-    return Settled(data, model, evidence, classes, judged, dict(ran), stairs, refuted)
+    return Settled(
+        data, model, evidence, classes, judged, dict(ran), stairs,
+        refuted_steps(states, model), uneven_effects(states, model),
+    )  # fmt: skip
 
 
 def _valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judged]]:
