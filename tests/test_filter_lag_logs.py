@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from syncline_design.diagnosis.past import LoggedPast
+from syncline_design.diagnosis.trajectory import SplinePieces, pieces
 from syncline_design.effects.kinematics import euler_to_rotation
 from syncline_design.logs.log import LogTrack
 
@@ -96,3 +97,21 @@ def test_lag_at_another_rate_of_the_velocity() -> None:
     wanted = np.interp(at, fine, smooth - path)
     np.testing.assert_allclose(place[8:, 0], wanted[8:], atol=2e-3)
     assert float(np.max(np.abs(wanted))) > 2.0
+
+
+def test_splines_are_made_once_for_all_time_constants(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And each lag is the one that a past asked for nothing else gives, to the last digit."""
+    made = []
+
+    def counted(*given: Array) -> SplinePieces:
+        made.append(1)
+        return pieces(*given)
+
+    monkeypatch.setattr("syncline_design.diagnosis.past.pieces", counted)
+    t, constants_s = np.arange(0.0, 30.0, 0.1), (0.25, 0.5, 1.0, 2.0)
+    one = past(t)
+    found = [one(constant_s) for constant_s in constants_s]
+    assert len(made) == 2  # of the velocity, and of dR/dt
+    for constant_s, lags in zip(constants_s, found, strict=True):
+        for lag, alone in zip(lags, past(t)(constant_s), strict=True):
+            np.testing.assert_array_equal(lag, alone)

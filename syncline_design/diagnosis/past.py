@@ -22,8 +22,17 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 MEMORY_S = 60.0  # of the past that is looked at
 AHEAD = 12  # rows after a stamp that the spline up to it feels
-KEPT = 3  # time constants whose lag is kept
+KEPT = 8  # time constants whose lag is kept: those that are looked for at first, and a fit's own
 FORGOTTEN = 1e-18  # share of the past that no longer counts
+
+
+@dataclass(frozen=True, slots=True)
+class _Splined:
+    """Splines of the velocity and of dR/dt, and how every stretch of the latter begins to turn."""
+
+    velocity: SplinePieces
+    turning: SplinePieces
+    turns: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +50,7 @@ class LoggedPast:
     rate_radps: Array
     from_positions: bool = False
     found: dict[float, tuple[Array, Array]] = field(default_factory=dict, compare=False, repr=False)
+    splined: list[_Splined] = field(default_factory=list, compare=False, repr=False)
 
     def part(self, index: Rows) -> LoggedPast:
         """The same past at some of the stamps."""
@@ -77,17 +87,23 @@ class LoggedPast:
             velocity = pieces(self.velocity.time_s, self.velocity.value)
             lag = -time_constant_s * velocity.value(self.at_s, self.at_s)
             return lag, np.zeros((self.at_s.shape[0], 3, 3))
+        if not self.splined:
+            self.splined.append(self._splined())
+        (own,) = self.splined
+        paths = _path_turns(own.velocity, time_constant_s)
+        place = self._passed(own.velocity, paths, time_constant_s)
+        turn = self._passed(own.turning, own.turns, time_constant_s).reshape(-1, 3, 3)
+        return -time_constant_s * place, -time_constant_s * turn
+
+    def _splined(self) -> _Splined:
+        """What the lags of all time constants are taken of."""
         near = _needed(self.velocity.time_s, self.at_s)
         velocity = pieces(self.velocity.time_s[near], self.velocity.value[near])
         near = _needed(self.stamps_s, self.at_s)
         rotation, rate = self.rotation[near], self.rate_radps[near]
         turning = pieces(self.stamps_s[near], (rotation @ _skew(rate)).reshape(-1, 9))
         begun = near[np.searchsorted(self.stamps_s[near], turning.starts)]
-        turns = rotate(self.rotation[begun], self.rate_radps[begun])
-        paths = _path_turns(velocity, time_constant_s)
-        place = self._passed(velocity, paths, time_constant_s)
-        turn = self._passed(turning, turns, time_constant_s).reshape(-1, 3, 3)
-        return -time_constant_s * place, -time_constant_s * turn
+        return _Splined(velocity, turning, rotate(self.rotation[begun], self.rate_radps[begun]))
 
     def _passed(self, series: SplinePieces, turns: Array, time_constant_s: float) -> Array:
         """Low pass (n, k) of a series; turns: how each stretch has been turning before it."""
