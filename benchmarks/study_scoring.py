@@ -15,6 +15,7 @@ from tests.world.worldlog import WorldLog
 
 Row = dict[str, Any]
 NO_SLOPE = STOCHASTIC | DISCRETE
+SAME_MOMENT = 0.03  # of the log
 FEW = 3  # aliases that a noise effect may carry
 
 
@@ -49,12 +50,24 @@ def stands_for(log: WorldLog, effect: Hidden, finding: Row) -> bool:
 
     An alias counts only if the world itself says that the two cannot be told apart here.
     """
-    if exact(effect, finding):
+    if exact(effect, finding) or _is_the_step(log, effect, finding):
         return True
     if not same(effect, finding) or effect.effect in NO_SLOPE:
         return same(effect, finding) and len(finding["aliases"]) <= FEW
     other = (finding["effect"], finding["sensor"], finding.get("stage"))
     return not told_apart(log, effect, other)
+
+
+def _is_the_step(log: WorldLog, effect: Hidden, finding: Row) -> bool:
+    """A delay from the moment of a clock's step to the end of the log is that step."""
+    if effect.effect != "timestamp_step" or finding["effect"] != "latency":
+        return False
+    if finding["sensor"] != effect.sensor or finding.get("from_s") is None:
+        return False
+    time_s = log.run.stamps_s
+    late = abs(finding["from_s"] - time_s[0] - effect.number("time_s"))
+    early = time_s[-1] - finding["to_s"]
+    return bool(max(late, early) < SAME_MOMENT * float(np.ptp(time_s)))
 
 
 def parameters(log: WorldLog, effect: Hidden, finding: Row, bounds: dict[Any, float]) -> list[Row]:
