@@ -289,14 +289,20 @@ def missed(row: Row) -> bool:
 
 
 def by_label(rows: list[Row]) -> str:
-    """How often each effect was named at ten bounds."""
+    """How often each effect was named at ten bounds, of those that were missed or not alone."""
     lines = ["| hidden effect at ten bounds | named | false beside it |", "|---|---|---|"]
     own = [r for r in rows if r["asked"] == "hidden" and "error" not in r]
+    bad = {r["label"] for r in own if not r["named"] or any(f[2] for f in r["false"])}
+    others = [r for r in own if r["label"] not in bad]
+    own = [r for r in own if r["label"] in bad]
     for label in sorted({r["label"] for r in own}):
         part = [r for r in own if r["label"] == label]
         false = sorted({f"{f[0]} ({f[1]})" for r in part for f in r["false"] if f[2]})
         named = f"{sum(bool(r['named']) for r in part)} of {len(part)}"
         lines.append(f"| {label} | {named} | {', '.join(false) or 'nothing'} |")
+    if others:
+        kinds = len({r["label"] for r in others})
+        lines.append(f"| {kinds} others | {len(others)} of {len(others)} | nothing |")
     return "\n".join(lines)
 
 
