@@ -26,12 +26,14 @@ _SIDE: Final = 5  # messages whose median is a level
 _BLOCK: Final = 24  # messages that tell a usual interval, delay and scatter
 _JUMP: Final = 3.0  # of the delays' scatter: a clock that goes back by less is not told from them
 _INTERVALS: Final = 1.5  # and of the interval
-_GAP, _CALM = 0.5, 0.3  # of what usually passes
+_GAP, _LONG, _CALM = 0.5, 2.0, 0.3  # of what usually passes
 _MIXED: Final = 48  # messages about a jump that may be of either side
 _APART: Final = 12  # messages between two jumps
+_OFTEN, _LEAST_OF_RUN = 8, 3
+_HERE: Final = 0.5  # of a jump, by the messages next to it
 _LEVEL: Final = 64  # messages that tell how far it went
 _NEAR: Final = 0.2  # of an interval: how near to the rhythm stamps are once in order
-_MOST_ODD: Final = 0.1  # of all intervals
+_MOST_ODD: Final = 0.1  # of all intervals, and of all stamps
 _ROUNDS: Final = 3
 _NEXT: Final = 9  # intervals, most of which are usual
 _MOST_FREE: Final = 20_000
@@ -64,10 +66,13 @@ def sequence_of(series: Series) -> Sequence | None:
     stamp, receive = series.stamp[places], series.receive[places]
     late = (receive - stamp).astype(np.float64)
     least = _least(receive, late)
+    if _crowded(_of_stamps(stamp, receive, least)):
+        return None
     level = set_by(stamp, receive)
     key = stamp + np.round(level).astype(np.int64)
-    usual = _course(late - level)
-    away = late - level - usual
+    jumps = _levels(late, np.abs(_advance(receive - stamp)) > least, least)  # of either clock
+    usual = jumps + _course(late - jumps)
+    away = late - usual
     right = away > -least  # nothing comes before it was measured
     for _ in range(_ROUNDS):
         odd = _wrong(key, away, right)
@@ -76,12 +81,12 @@ def sequence_of(series: Series) -> Sequence | None:
         right &= ~odd
     behind = np.maximum.accumulate(np.where(right, key, key.min())) - key
     right &= behind <= _DEEPEST_NS
-    period = _kept(key[right])
+    period = _kept(key[right]) if float(np.mean(right)) > 1.0 - _MOST_ODD else None
     if period is None:
         return None
     told = np.zeros(series.stamp.size, bool)
     told[places[right]] = True
-    order = np.argsort(_placed(series, told, key[right], usual, least), kind="stable")
+    order = np.argsort(_placed(series, told, key[right], usual - level, least), kind="stable")
     wrong = series.good & ~told
     wrong[places[:_SIDE]] = wrong[places[-_SIDE:]] = False  # too few to tell a jump by
     overtaken: Array = np.where(right, behind, 0).astype(np.float64)
@@ -172,15 +177,15 @@ def _levels(late: Array, off: Mask, least: float) -> Array:
 
     off: where the messages of both sides differ.  Near a jump how late a message is tells its side.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(int)))
-    found = np.concatenate([[0], (edges[::2] + edges[1::2] - 1) // 2 + _SIDE, [late.size]])
+    found = np.concatenate([[0], _middles(off) + _SIDE, [late.size]])
     level = np.zeros(late.size)
     last = -_APART
     for at in found[1:-1]:
         first, end = _bounds(found, int(at))
         base = float(np.median(late[max(first, at - _LEVEL) : at]))
         moved = float(np.median(late[at : min(end, at + _LEVEL)])) - base
-        if abs(moved) < least or at < last + _APART:
+        near = float(np.median(late[at : at + _APART]) - np.median(late[max(0, at - _APART) : at]))
+        if abs(moved) < least or at < last + _APART or near / moved < _HERE:
             continue
         last = at
         level[at:] += moved
@@ -188,6 +193,17 @@ def _levels(late: Array, off: Mask, least: float) -> Array:
         new = (late[zone] - base) / moved > 0.5
         level[zone] += moved * (new.astype(float) - (zone >= at).astype(float))
     return level
+
+
+def _middles(off: Mask) -> Places:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], off, [False]]).astype(int)))
+    return np.asarray((edges[::2] + edges[1::2] - 1) // 2)
+
+
+def _crowded(off: Mask) -> bool:
+    """Whether a clock jumps so often that no messages between tell how far."""
+    apart = np.diff(_middles(off))
+    return apart.size >= _OFTEN and float(np.median(apart)) < _APART + _LEAST_OF_RUN
 
 
 def _bounds(found: Places, at: int) -> tuple[int, int]:
@@ -204,7 +220,7 @@ def _of_stamps(stamp: NDArray[np.int64], receive: NDArray[np.int64], least: floa
     odd = np.abs(counted - usual) > np.abs(passed - usual)
     # a clock may jump in a gap as well; not where messages had to wait, which then come at once
     calm = np.append(passed[_SIDE:], np.full(min(_SIDE, passed.size), usual)) > _CALM * usual
-    in_gap = calm & (np.abs(counted - usual) > _GAP * usual)
+    in_gap = calm & (passed > _LONG * usual) & (np.abs(counted - usual) > _GAP * usual)
     return np.asarray((np.abs(passed - counted) > least) & (odd | in_gap))
 
 
