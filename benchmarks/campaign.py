@@ -2,7 +2,8 @@
 
     python -m benchmarks.campaign logs [--count N] [--foreign] [--kind position]
     python -m benchmarks.campaign power [--sets N] [--foreign]
-    python -m benchmarks.campaign series [--series N] [--looks N]
+    python -m benchmarks.campaign series [--series N] [--looks N] [--scatter S] [--drift D]
+        [--constants N] [--days FOLDER]
     python -m benchmarks.campaign quiet [--foreign]
     python -m benchmarks.campaign cover [--sets N] [--foreign]
 
@@ -10,7 +11,11 @@
 `power` takes sets of them, adds an effect of three bounds of each log (every parameter, sign
 drawn) and asks what is named.  The effect is added to the statistics, along the slopes; whole logs
 with such an effect are in tests/test_joint.py.  `series` draws statistics of runs like these from
-the normal law and watches them; `quiet` watches the clean logs themselves, platform by platform.
+the normal law and watches them, with one effect drawn from the dictionary that differs from run to
+run by S bounds of a run, or that drifts by D bounds over all runs, and N effects of 20 bounds in
+all runs.  FOLDER: stores that `benchmarks.days --keep` left, of which the first six days are clean;
+else the logs are those that were kept.  `quiet` watches the clean logs themselves, platform by
+platform.
 """
 
 from __future__ import annotations
@@ -32,6 +37,7 @@ from benchmarks.study_scoring import proportion
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.naming import Naming
 from syncline_design.campaign.pool import Pool, Scoped, Term, fitted, pool_of
+from syncline_design.campaign.store import read_store
 from syncline_design.diagnosis.fitting import finely, fit
 from syncline_design.diagnosis.run import prepared
 from syncline_design.diagnosis.slow_states import slow_states
@@ -45,6 +51,8 @@ PLATFORMS = ("multirotor_lines", "car_stops", "vessel_figure_eights", "fixed_win
 OUT = Path("out")
 SIZES = (1, 2, 4, 9)
 BOUNDS = 3.0
+CONSTANT = 20.0  # bounds of a run, of what all runs have
+CLEAN_DAYS = 6
 SECONDS, HZ = 120.0, 5.0
 SHIPPED = ("white", "wandering")
 
@@ -153,21 +161,35 @@ def drawn(one: Sufficient, rng: np.random.Generator, values: np.ndarray) -> Suff
     return Sufficient(one.labels, normal, score, 0.0, one.gram, (left,))
 
 
-def series(count: int, looks: int, kind: str) -> None:
+def logs_of_days(folder: Path) -> list[Sufficient]:
+    """Statistics of the clean days of watches end to end."""
+    stores = [read_store(path) for path in sorted(folder.glob("*/store.jsonl"))]
+    return [one.found for s in stores if s is not None for one in s.entries[:CLEAN_DAYS]]
+
+
+def series(
+    logs: Sequence[Sufficient],
+    count: int,
+    looks: int,
+    scatter: float,
+    drift: float,
+    constants: int,
+) -> None:
     """False alarms over all looks, and how late a change of three bounds is heard."""
-    logs = [s for own in logs_of(kind, is_foreign=False).values() for s in own]
-    rung, delays = 0, {3.0: [], 5.0: [], 8.0: []}
+    rings, delays = [], {3.0: [], 5.0: [], 8.0: []}
     for k in range(count):
         rng = np.random.default_rng([11, k])
         group = [one for one in logs if one.labels == logs[k % len(logs)].labels]
         picks = [group[i] for i in rng.integers(len(group), size=looks + 1)]
-        zero = np.zeros(len(picks[0].labels))
-        changes = Changes(pool_of([drawn(s, rng, zero) for s in picks], range(looks + 1)))
-        rung += _first_ring(changes, range(2, looks + 2)) is not None
+        values = _unrest(picks, rng, scatter, drift) + _constants(picks, rng, constants)
+        runs = [drawn(s, rng, own) for s, own in zip(picks, values, strict=True)]
+        rings.append(_first_ring(Changes(pool_of(runs, range(looks + 1))), range(2, looks + 2)))
         for bounds in delays if k % 4 == 0 else ():
-            delays[bounds].append(_delay(picks[:31], rng, bounds))
+            delays[bounds].append(_delay(picks[:31], rng, bounds, scatter))
         if (k + 1) % 20 == 0:
-            print(f"{k + 1} series of {looks} looks: rung {share(rung, k + 1)}", flush=True)
+            rung = [one for one in rings if one is not None]
+            print(f"scatter {scatter:g}, drift {drift:g}: {k + 1} series of {looks} looks: rung "
+                  f"{share(len(rung), k + 1)}, with run {sorted(rung)}", flush=True)  # fmt: skip
     for bounds, found in delays.items():
         heard = np.sort(found)
         middle, late = np.quantile(heard, [0.5, 0.9])
@@ -175,16 +197,46 @@ def series(count: int, looks: int, kind: str) -> None:
               f"{middle:.0f} in the median, {late:.0f} in 90 % ({len(heard)} series)")  # fmt: skip
 
 
-def _delay(picks: Sequence[Sufficient], rng: np.random.Generator, bounds: float) -> float:
+def _constants(picks: Sequence[Sufficient], rng: np.random.Generator, count: int) -> np.ndarray:
+    """Values of all parameters that every run has, (P,): of so many effects, of 20 bounds."""
+    pool = pool_of(picks, range(len(picks)))
+    found = np.zeros(len(pool.labels))
+    for k in rng.choice(len(pool.terms), count, replace=False):
+        found[pool.terms[k].index] = CONSTANT / BOUNDS * _values(pool, pool.terms[k], rng)
+    return found[[pool.labels.index(label) for label in picks[0].labels]]
+
+
+def _unrest(
+    picks: Sequence[Sufficient], rng: np.random.Generator, scatter: float, drift: float
+) -> np.ndarray:
+    """Values of all parameters by run, (L, P): one effect's differ by bounds of a run."""
+    found = np.zeros((len(picks), len(picks[0].labels)))
+    if not scatter and not drift:
+        return found
+    pool = pool_of(picks, range(len(picks)))
+    term = pool.terms[int(rng.integers(len(pool.terms)))]
+    normal = pool.normal.mean(axis=0)[np.ix_(term.index, term.index)]
+    size, turned = np.linalg.eigh(np.linalg.pinv(normal, rcond=1e-9, hermitian=True))
+    root = turned * np.sqrt(np.maximum(size, 0.0))
+    away = scatter * rng.standard_normal((len(picks), term.size)) @ root.T
+    grown = np.linspace(0.0, drift, len(picks))[:, None] * root.sum(axis=1)
+    place = [picks[0].labels.index(pool.labels[i]) for i in term.index]
+    found[:, place] = away + grown
+    return found
+
+
+def _delay(
+    picks: Sequence[Sufficient], rng: np.random.Generator, bounds: float, scatter: float
+) -> float:
     """Runs with the change until the alarm, the first counted; 21 where it never came."""
     quiet = pool_of(picks, range(len(picks)))
     term = quiet.terms[int(rng.integers(len(quiet.terms)))]
     values = np.zeros(len(quiet.labels))
     values[term.index] = bounds / BOUNDS * _values(quiet, term, rng)
     place = [quiet.labels.index(label) for label in picks[0].labels]
-    runs = [
-        drawn(s, rng, (values if k >= 10 else 0.0 * values)[place]) for k, s in enumerate(picks)
-    ]
+    moved = np.array([(values if k >= 10 else 0.0 * values)[place] for k in range(len(picks))])
+    moved += _unrest(picks, rng, scatter, 0.0)
+    runs = [drawn(s, rng, own) for s, own in zip(picks, moved, strict=True)]
     changes = Changes(pool_of(runs, range(len(runs))))
     ring = _first_ring(changes, range(11, len(runs) + 1))
     return 21.0 if ring is None else ring - 10.0
@@ -233,6 +285,10 @@ def main() -> None:
     parser.add_argument("--sets", type=int, default=100)
     parser.add_argument("--series", type=int, default=200)
     parser.add_argument("--looks", type=int, default=100)
+    parser.add_argument("--scatter", type=float, default=0.0)
+    parser.add_argument("--drift", type=float, default=0.0)
+    parser.add_argument("--constants", type=int, default=0)
+    parser.add_argument("--days", type=Path)
     parser.add_argument("--kind", default="georeference", choices=["georeference", "position"])
     parser.add_argument("--foreign", action="store_true")
     asked = parser.parse_args()
@@ -243,7 +299,12 @@ def main() -> None:
     elif asked.what == "cover":
         cover(asked.sets, is_foreign=asked.foreign)
     elif asked.what == "series":
-        series(asked.series, asked.looks, asked.kind)
+        logs = (
+            [s for own in logs_of(asked.kind, is_foreign=False).values() for s in own]
+            if asked.days is None
+            else logs_of_days(asked.days)
+        )
+        series(logs, asked.series, asked.looks, asked.scatter, asked.drift, asked.constants)
     else:
         quiet(asked.kind, is_foreign=asked.foreign)
 

@@ -1,11 +1,12 @@
 """Days of a vehicle watched by the command, end to end: false alarms, and delays.
 
-    python -m benchmarks.days [--series 10] [--first 0] [--days 8] [--moved 5] [--store FILE]
+    python -m benchmarks.days [--series 10] [--first 0] [--days 10] [--moved 6] [--bounds 5]
+        [--store FILE] [--keep FOLDER]
 
 Every series is a vehicle of the hidden world (tests/world) with another drive every day and white
-noise of the spec's size; with the day after `moved` one effect is another by BOUNDS bounds of one
+noise of the spec's size; with the day after `moved` one effect is another by so many bounds of one
 log.  `watch STORE SPEC DAY.csv` is called every day, as a user calls it; docs/joint.md has the
-table that this prints.
+table that this prints.  Stores stay in FOLDER where one is named.
 """
 
 from __future__ import annotations
@@ -37,7 +38,6 @@ EFFECTS = (
     ("range_bias", "ranging", "bias_m"),
     ("boresight", "ranging", "z_rad"),
 )
-BOUNDS = 5.0
 SECONDS, HZ, DAY_S = 30.0, 5.0, 86_400.0
 FIRST_S = 1_790_000_000.0  # 2026-09-21
 
@@ -83,15 +83,19 @@ def watched(folder: Path, series: int, day: int, log: WorldLog) -> dict[str, obj
     }  # fmt: skip
 
 
-def one_series(series: int, days: int, moved: int) -> dict[str, object]:
+def one_series(
+    series: int, days: int, moved: int, bounds: float, keep: Path | None
+) -> dict[str, object]:
     """All days of a series."""
     effect, sensor, name = EFFECTS[series % len(EFFECTS)]
-    size = BOUNDS * bound(series)
+    size = bounds * bound(series)
     looks = []
     with tempfile.TemporaryDirectory() as folder:
+        own = Path(folder) if keep is None else keep / f"series{series + 1}"
+        own.mkdir(parents=True, exist_ok=True)
         for day in range(days):
             log = day_log(series, day, {name: size} if day >= moved else None)
-            looks.append(watched(Path(folder), series, day, log))
+            looks.append(watched(own, series, day, log))
             print(json.dumps(looks[-1]), file=sys.stderr, flush=True)
     return {
         "series": series, "platform": PLATFORMS[series % len(PLATFORMS)], "moved": moved,
@@ -119,15 +123,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--series", type=int, default=10)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--days", type=int, default=8)
-    parser.add_argument("--moved", type=int, default=5)
+    parser.add_argument("--days", type=int, default=10)
+    parser.add_argument("--moved", type=int, default=6)
+    parser.add_argument("--bounds", type=float, default=5.0)
     parser.add_argument("--store", type=Path)
+    parser.add_argument("--keep", type=Path)
     asked = parser.parse_args()
     rows = []
     if asked.store is not None and asked.store.exists():
         rows = [json.loads(line) for line in asked.store.read_text("utf-8").splitlines()]
     for series in range(asked.first + len(rows), asked.first + asked.series):
-        rows.append(one_series(series, asked.days, asked.moved))
+        rows.append(one_series(series, asked.days, asked.moved, asked.bounds, asked.keep))
         if asked.store is not None:
             with asked.store.open("a", encoding="utf-8") as out:
                 out.write(json.dumps(rows[-1]) + "\n")

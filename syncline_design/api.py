@@ -238,7 +238,8 @@ def plan(
 ) -> PlanRun:  # fmt: skip
     """The test drive that tells what is asked: `result` is the plan as data, `path` its waypoints.
 
-    reach: "latency(position)=1 ms, lever_arm(position)=1 cm".  separate: two effects to tell apart.
+    reach: "latency(position)=1 ms, lever_arm(position)=1 cm".  separate: two effects to tell apart,
+    the first as "latency(position)=100 ms" where its size is known, the second one or several.
     diagnosis: what one could not tell apart.  flown: a log held against what is asked.
     """
     from syncline_design.planning import run, setup, wanted
@@ -247,10 +248,7 @@ def plan(
 
     seed = _seed(seed)
     least = arguments.amount("minutes", minutes, 0.0)
-    pairs: tuple[wanted.EffectPair, ...] = ()
-    if separate is not None:
-        first, second = (wanted.named(one, "separate") for one in separate)
-        pairs = (wanted.EffectPair(first, second),)
+    pairs = () if separate is None else wanted.separate_of(*separate)
     asked = wanted.PlanWanted(() if reach is None else wanted.reach_of(reach), pairs)
     files = tuple(_files(flown))
     with _limited(time_limit_s):

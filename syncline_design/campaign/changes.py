@@ -1,22 +1,35 @@
 """Whether an effect of a system changed from one run to a later one, however often it is asked.
 
 Until a change every parameter b is one value in all runs; from run k on one effect c has b_c + d.
-With S_n the sum of all information, T that of the runs from k on, both freed of b (prior as wide
-as an effect can be),
+With S_n the sum of all information and of the prior of b, T the information of the runs from k on,
     N = I_T[c, c] - I_T[c, :] S_n^-1 I_T[:, c],   s = g_T[c] - I_T[c, :] S_n^-1 g,
 and with d ~ N(0, D), D of REACH bounds of one run, the Bayes factor for the change is
     B_ck = |1 + N D|^-1/2 exp(s' (N + D^-1)^-1 s / 2).
-Mixed over all effects alike and over k with weights w_k that sum to one (changes that did not
-happen yet count one), E_n = sum_k w_k mean_c B_ck is an e-process: without a change it reaches
-1 / alpha at any look, of however many, with a chance of at most alpha (Ville's inequality).
-Noise that is not the model's: the variance of an effect grows by what the scatter of the parts of
-runs, and of the runs before k among themselves, has beyond it.
+What the build has all along is no alarm: effects that all runs together show as constants may have
+any value that they can have.  Those that they do not show are small: 0 to within PLAUSIBLE of their
+own standard deviations by all these runs.  Were every one of them free, a day that is driven
+otherwise than the days before would say next to nothing: some sum of constants that those days did
+not show would do for any change.
+Nobody knows by how much c differs from run to run while nothing is moved.  Its runs have phi times
+the variance that their noise says, phi from an inverse gamma law of mean about 1, and R is their
+scatter, before k and from k on each about its own mean, of f free values:
+    B_ck = |1 + N D|^-1/2 ((v + R + Q) / (v + R + Q - h))^((v + f + p) / 2),
+    Q = s' N^-1 s,   h = s' (N + D^-1)^-1 s,   d ~ N(0, phi D),
+a Student ratio: one day far off is a change where its runs agreed before, and none where they do
+not or where they are few.  v = RUNS_KNOWN, which many runs outweigh.
+Mixed over effects with weights w_c (the common ones have more) and over k with weights w_k, each of
+sum one (changes that did not happen yet count one), E_n = sum w_k w_c B_ck is an e-process: without
+a change it reaches 1 / alpha at any look, of however many, with a chance of at most alpha (Ville's
+inequality, over the law of phi; docs/joint.md has what single values of it come to).
+Noise inside runs that is not the model's: the variance grows by what the scatter of the parts of
+runs has beyond it.
 Sources: Ville (1939); Ramdas, Gruenwald, Vovk, Shafer, Statistical Science 38 (2023), on
 e-processes; Shin, Ramdas, Rinaldo, New England J. Stat. Data Sci. 2 (2024), on changes.
 """
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Final
 
@@ -24,22 +37,27 @@ import numpy as np
 
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
+from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
-SOON: Final = 100  # runs since the baseline in any of which a change is as likely
-SOON_SHARE: Final = 0.9
-RUNS_KNOWN: Final = 10.0  # runs that the noise fitted counts for, against the scatter of runs
+EARLY: Final = 10.0  # runs after which a change is met half as often as at the first
+RUNS_KNOWN: Final = 12.0  # runs that the noise fitted counts for, against the scatter of runs
+PLAUSIBLE: Final = 2.0  # standard deviations within which a constant is that no run shows
+SHOWN_NATS: Final = 2.0  # beyond one a parameter, from which runs show a constant
+MOST_SHOWN: Final = 8
 MOST_LOG: Final = 690.0
 
 
 def weight_of(k: int) -> float:
     """Share of the false alarms that a change at the run k (from 2) may have."""
-    if k <= SOON + 1:
-        return SOON_SHARE / SOON
-    j = k - SOON - 1
-    return (1.0 - SOON_SHARE) / (j * (j + 1.0))
+    return _later(k) - _later(k + 1)
+
+
+def _later(k: int) -> float:
+    """Share of the changes at the run k (from 2) or later: what was mounted last moves first."""
+    return math.sqrt((EARLY + 2.0) / (EARLY + k))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +82,34 @@ class Group:
     def blocks(self) -> tuple[Index, Index]:
         """Index of their own blocks in matrices (..., P, P)."""
         return self.index[:, :, None], self.index[:, None, :]
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """Of runs parted at every k from 1, and not parted, by term of a group: (look, G).
+
+    shape: (v + f + p) / 2 and scale: v + R of the law of their variance over that fitted; R is
+    taken as f at least, for what the noise inside runs makes is always there.
+    """
+
+    shape: Array
+    scale: Array
+    size: int
+
+    @classmethod
+    def of(cls, squares: Array, seen: Index, group: Group) -> Scatter:
+        """squares (look, G): R; seen (look, G): parameters that each run says anything of."""
+        size = group.index.shape[1]
+        before = np.cumsum(seen, axis=0)
+        after = before[-1] - before
+        free = np.maximum(before - size, 0) + np.maximum(after - size, 0)
+        scale = RUNS_KNOWN + np.maximum(squares, free)
+        return cls(0.5 * (RUNS_KNOWN + free + size), scale, size)
+
+    @property
+    def factor(self) -> Array:
+        """The variance over that fitted, as far as it is known."""
+        return self.scale / (2.0 * self.shape - self.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +137,7 @@ class Changes:
 
     @cached_property
     def prior(self) -> Array:
-        """Prior information of the values before: as large as each can be, (P,)."""
+        """Prior information of what may have any value that it can have, (P,)."""
         found = np.zeros(len(self.pool.labels))
         for term in self.terms:
             found[term.index] = [p.high**-2.0 for p in term.effect.slopes()]
@@ -121,12 +167,18 @@ class Changes:
         ]
         return np.asarray(np.max(scatter, axis=0))
 
+    @cached_property
+    def log_weights(self) -> Array:
+        """log w_c: in inverse ratio to how seldom an effect is met, (C,)."""
+        share = np.array([1.0 / commonness(term.label)[0] for term in self.terms])
+        found: Array = np.log(share / np.sum(share))
+        return found
+
     def log_evidence(self, look: int) -> tuple[float, Array]:
-        """log E_n of the first `look` runs, and log w_k B_ck / C of every k from 1 and c."""
+        """log E_n of the first `look` runs, and log w_k w_c B_ck of every k from 1 and c."""
         weights = np.array([weight_of(k + 1) for k in range(1, look)])
-        table = np.log(weights)[:, None] + self._factors(look) - np.log(len(self.terms))
-        rest = max(1.0 - float(np.sum(weights)), 1e-300)
-        return float(np.logaddexp.reduce([*table.ravel(), np.log(rest)])), table
+        table = np.log(weights)[:, None] + self._factors(look) + self.log_weights
+        return float(np.logaddexp.reduce([*table.ravel(), math.log(_later(look + 1))])), table
 
     @cached_property
     def course(self) -> Array:
@@ -147,11 +199,14 @@ class Changes:
     def _factors(self, look: int) -> Array:
         """log B_ck of every k from 1 and c, (look - 1, C)."""
         found = np.zeros((look - 1, len(self.terms)))
-        temper = self.temper(look)
-        for group, normal, score in zip(self.groups, *self._freed(look), strict=True):
-            own = temper[:, group.terms]
+        parts = zip(self.groups, *self._freed(look), self._scatters(look), strict=True)
+        for group, normal, score, scatter in parts:
+            inside = self._inside(look)[group.terms]
             found[:, group.terms] = _log_bayes(
-                normal / own[:, :, None, None], score / own[:, :, None], self._reach(look, group)
+                normal / inside[:, None, None],
+                score / inside[:, None],
+                self._reach(look, group),
+                scatter,
             )
         return found
 
@@ -177,7 +232,7 @@ class Changes:
         if look in self._last:
             return self._last[look]
         normal, score = self.pool.normal[:look], self.pool.score[:look]
-        inverse = _pseudo_inverse(normal.sum(axis=0) + np.diag(self.prior))
+        inverse = _pseudo_inverse(self._total(look))
         later = np.cumsum(normal[::-1], axis=0)[::-1][1:]
         scores = np.cumsum(score[::-1], axis=0)[::-1][1:]
         cross = later @ inverse
@@ -195,9 +250,15 @@ class Changes:
         return REACH**2 * inverted(self.pool.normal[:look].mean(axis=0)[group.blocks])
 
     def temper(self, look: int) -> Array:
-        """Variance over that fitted, of every k from 1 and c: within, and between runs before."""
-        inside = np.maximum(1.0, self.within[:look].mean(axis=0))
-        return np.asarray(inside * np.maximum(1.0, self.between[: look - 1]))
+        """Variance over that fitted, of every k from 1 and c: inside runs, and between them."""
+        found = np.zeros((look - 1, len(self.terms)))
+        for group, scatter in zip(self.groups, self._scatters(look), strict=True):
+            found[:, group.terms] = scatter.factor[:-1]
+        return np.asarray(self._inside(look) * found)
+
+    def _inside(self, look: int) -> Array:
+        """Variance by the scatter of the parts of runs over that fitted, (C,)."""
+        return np.asarray(np.maximum(1.0, self.within[:look].mean(axis=0)))
 
     @cached_property
     def between(self) -> Array:
@@ -207,28 +268,55 @@ class Changes:
         return np.array([*known, *rest]).reshape(self.pool.count, len(self.terms))
 
     def between_of(self, k: int) -> Array:
-        """The same of one k, (C,).
+        """The same of one k, (C,)."""
+        found = np.ones(len(self.terms))
+        for group, scatter in zip(self.groups, self._scatters(k), strict=True):
+            found[group.terms] = scatter.factor[-1]
+        return found
+
+    def _scatters(self, look: int) -> tuple[Scatter, ...]:
+        """Of the first `look` runs parted at every k from 1, and not parted, by group of terms.
 
         Cochran's Q of each effect alone, the values of all others those of these runs together.
         """
-        found = np.ones(len(self.terms))
-        if k < 2:
-            return found
-        total, score = (sums[k - 1] for sums in self._sums)
-        left = self.pool.score[:k] - self.pool.normal[:k] @ _values(total, score)
-        within = np.maximum(1.0, self.within[:k].mean(axis=0))
+        known = _values(self._total(look), self.pool.score[:look].sum(axis=0))
+        left = self.pool.score[:look] - self.pool.normal[:look] @ known
+        found = []
         for g, inverse in zip(self.groups, self._inverses, strict=True):
-            own, size = left[:, g.index], g.index.shape[1]
-            square = np.einsum("rga,rgab,rgb->g", own, inverse[:k], own)
-            free, known = size * (k - 1.0), size * RUNS_KNOWN
-            found[g.terms] = (square / within[g.terms] + known) / (free + known)
-        return found
+            normal = self.pool.normal[:look, *g.blocks]
+            squares = _scattered(normal, inverse[:look], left[:, g.index])
+            seen = np.sum(np.einsum("rgaa->rga", normal) > 0.0, axis=-1)
+            found.append(Scatter.of(squares / self._inside(look)[g.terms], seen, g))
+        return tuple(found)
 
-    @cached_property
-    def _sums(self) -> tuple[Array, Array]:
-        """Information with the prior, and score, of the first k runs together, k from 1."""
-        totals = np.cumsum(self.pool.normal, axis=0) + np.diag(self.prior)
-        return totals, np.cumsum(self.pool.score, axis=0)
+    def _total(self, look: int) -> Array:
+        """Information of the first `look` runs together, with the prior of what they show."""
+        total = self.pool.normal[:look].sum(axis=0)
+        prior = np.diag(total) / PLAUSIBLE**2
+        shown = self._shown(total, self.pool.score[:look].sum(axis=0), self._inside(look))
+        index = np.concatenate([self.terms[c].index for c in shown] or [[]]).astype(np.int64)
+        prior[index] = self.prior[index]
+        return total + np.diag(np.maximum(prior, self.prior))
+
+    def _shown(self, total: Array, score: Array, inside: Array) -> list[int]:
+        """Effects that runs together show as constants: forward, the one that gains most first."""
+        found: list[int] = []
+        while len(found) < MOST_SHOWN:
+            gains = np.zeros(len(self.terms))
+            for group in self.groups:
+                own = np.einsum("ga,gab,gb->g", score[group.index],
+                                inverted(total[group.blocks]), score[group.index])  # fmt: skip
+                gains[group.terms] = 0.5 * own / inside[group.terms] - group.index.shape[1]
+            gains[found] = 0.0
+            best = int(np.argmax(gains))
+            if gains[best] < SHOWN_NATS:
+                break
+            found.append(best)
+            index = self.terms[best].index
+            inverse = inverted(total[np.ix_(index, index)])
+            score = score - total[:, index] @ inverse @ score[index]
+            total = total - total[:, index] @ inverse @ total[index]
+        return found
 
     @cached_property
     def _inverses(self) -> tuple[Array, ...]:
@@ -274,9 +362,26 @@ def _scatter(normal: Array, normals: Array, scores: Array, index: Index) -> floa
     return float(spread) / seen
 
 
-def _log_bayes(normal: Array, score: Array, reach: Array) -> Array:
-    """log |1 + N D|^-1/2 exp(s' (N + D^-1)^-1 s / 2) of N (n, G, p, p), s (n, G, p) and D
-    (G, p, p), which may have no inverse."""
+def _scattered(normals: Array, inverses: Array, scores: Array) -> Array:
+    """Cochran's Q of runs before k and of those from k on, together, k from 1 to all, (n, G).
+
+    normals, inverses (n, G, p, p) of single runs and their scores (n, G, p).
+    """
+    square = np.einsum("rga,rgab,rgb->g", scores, inverses, scores)
+    before, moved = np.cumsum(normals, axis=0), np.cumsum(scores, axis=0)
+    found: Array = square - _explained(before, moved)
+    found[:-1] -= _explained(before[-1] - before[:-1], moved[-1] - moved[:-1])
+    return np.maximum(found, 0.0)
+
+
+def _explained(normal: Array, score: Array) -> Array:
+    """s' N^-1 s."""
+    found: Array = np.einsum("kga,kgab,kgb->kg", score, inverted(normal), score)
+    return found
+
+
+def _log_bayes(normal: Array, score: Array, reach: Array, scatter: Scatter) -> Array:
+    """log B of N (n, G, p, p), s (n, G, p) and D (G, p, p), which may have no inverse."""
     values, vectors = np.linalg.eigh(reach)
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     inner = np.eye(reach.shape[-1]) + np.swapaxes(root, -1, -2) @ normal @ root
@@ -287,5 +392,7 @@ def _log_bayes(normal: Array, score: Array, reach: Array) -> Array:
         size = np.linalg.slogdet(inner)[1]
         solved = np.linalg.solve(inner, turned[..., None])[..., 0]
         square = np.sum(turned * solved, axis=-1)
-    found: Array = np.minimum(0.5 * square - 0.5 * size, MOST_LOG)
+    left = np.maximum(_explained(normal, score) - square, 0.0)
+    student = scatter.shape[:-1] * np.log1p(square / (scatter.scale[:-1] + left))
+    found: Array = np.minimum(student - 0.5 * size, MOST_LOG)
     return found

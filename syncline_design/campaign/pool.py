@@ -250,6 +250,8 @@ def inverted(normal: Array) -> Array:
     """Inverses of normal matrices, columns scaled alike first; zero for what is not seen."""
     size = np.diagonal(normal, axis1=-2, axis2=-1)
     seen = size > 0.0
+    if normal.shape[-1] == 1:
+        return np.divide(1.0, normal, out=np.zeros_like(normal), where=seen[..., None])
     scale = np.where(seen, np.sqrt(np.where(seen, size, 1.0)), 1.0)
     squares = scale[..., :, None] * scale[..., None, :]
     if normal.shape[-1] == 0:

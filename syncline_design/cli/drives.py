@@ -41,7 +41,11 @@ def plan(
     ] = None,
     separate: Annotated[
         tuple[str, str] | None,
-        typer.Option(metavar="A B", help='Two effects: "latency(position)" "lever_arm(position)".'),
+        typer.Option(
+            metavar="A B",
+            help='"latency(position)" "lever_arm(position)"; "latency(position)=100 ms" where its '
+            "size is known, B one effect or several.",
+        ),
     ] = None,
     reach: Annotated[
         str | None,
@@ -86,11 +90,9 @@ def plan(
 
 
 def _asked(separate: tuple[str, str] | None, reach: str | None) -> PlanWanted:
-    from syncline_design.planning.wanted import EffectPair, PlanWanted, named, reach_of
+    from syncline_design.planning.wanted import PlanWanted, reach_of, separate_of
 
-    pairs: tuple[EffectPair, ...] = ()
-    if separate is not None:
-        pairs = (EffectPair(named(separate[0], "--separate"), named(separate[1], "--separate")),)
+    pairs = () if separate is None else separate_of(*separate)
     return PlanWanted(() if reach is None else reach_of(reach), pairs)
 
 

@@ -20,6 +20,7 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.planning.aims import beside
+from syncline_design.planning.beyond import BeyondFirst
 from syncline_design.planning.information import (
     Unknown,
     drift_columns,
@@ -53,6 +54,7 @@ class World:
 
     rate_hz: rows a second that the log has.  measured: noise that a diagnosis found.  surveyed:
     targets that are there already (m, 3) [m]; None: they are put where the drive needs them.
+    beyond: pairs that are judged beyond first order.
     """
 
     system: System
@@ -60,6 +62,7 @@ class World:
     rate_hz: float
     measured: Noise | None = None
     surveyed: Array | None = None
+    beyond: tuple[BeyondFirst, ...] = ()
 
     @property
     def computed_hz(self) -> float:
@@ -100,6 +103,12 @@ class World:
         factor = tuple(share * f for f in level.factor)
         return structure, NoiseLevel(factor, level.slow, level.time_constant_s, level.size)
 
+    def columns(self, view: Scene) -> Array:
+        """Slopes by every unknown, what pairs are beyond first order, what the noise shifts."""
+        first = with_shift(view, self.every)
+        beyond = [one.columns(view) for one in self.beyond]
+        return np.concatenate([first[:, :, :-1], *beyond, first[:, :, -1:]], axis=2)
+
     def courses_of(self, stage: int, course: CourseCommands) -> list[CourseCommands]:
         """One stage drives, the others hold."""
         return [
@@ -127,20 +136,25 @@ class World:
             flown += [planned_log(self.system, one) for one in self.turned_about(courses)]
         whole, ends = one_after_another(flown, GAP_S)
         view = scene(self.system, whole, acting_of(self.system))
-        noise, slopes = self.noise(view), with_shift(view, self.every)
-        drifts = drift_columns(view, self.every, slopes[:, :, :-1])
-        slopes[:, :, :-1] -= _since(whole.time_s, ends)[:, None, None] * drifts
+        noise, slopes, known = self.noise(view), self.columns(view), len(self.every)
+        drifts = drift_columns(view, self.every, slopes[:, :, :known])
+        slopes[:, :, :known] -= _since(whole.time_s, ends)[:, None, None] * drifts
         drifting = np.flatnonzero(np.any(drifts != 0.0, axis=(0, 1)))
         both = np.concatenate([slopes, drifts[:, :, drifting]], axis=2)
-        parts = [self._told(noise, both, slice(*pair), drifting) for pair in pairwise(ends)]
+        count = slopes.shape[2]
+        parts = [self._told(noise, both, slice(*pair), drifting, count) for pair in pairwise(ends)]
         return tuple(self._summed(leg, parts[4 * k : 4 * k + 4]) for k, leg in enumerate(legs))
 
     def _told(
-        self, noise: tuple[Structure, NoiseLevel], both: Array, rows: slice, drifting: Index
+        self,
+        noise: tuple[Structure, NoiseLevel],
+        both: Array,
+        rows: slice,
+        drifting: Index,
+        count: int,
     ) -> tuple[Array, Array, Array]:
-        """G00, G0d + Gd0 and Gdd of some rows."""
+        """G00, G0d + Gd0 and Gdd of some rows; count: of the columns before the drifts."""
         in_force().check()
-        count = len(self.every) + 1
         cross, twice = np.zeros((count, count)), np.zeros((count, count))
         if rows.stop - rows.start < 2:
             return cross, cross, twice
@@ -243,7 +257,7 @@ def outcome(world: World, sequence: Sequence[LegTold]) -> WholeDrive:
     stretches, courses = whole_drive(world, sequence)
     driven = world.driven(courses)
     view = world.view(driven)
-    slopes = with_shift(view, world.every)
+    slopes = world.columns(view)
     structure, level = world.noise(view)
     after = []
     for one in stretches:

@@ -14,20 +14,20 @@ def asked_of(system: System, found: Diagnosis) -> PlanWanted:
     """The classes of a diagnosis; of one without, its causes; else what its log was blind to."""
     _demand_same(system, found)
     pairs = tuple(
-        EffectPair(_named(system, one), _named(system, rival), _sizes(one))
+        EffectPair(_named(system, one), _named(system, rival), sizes_of(one))
         for one in found.findings
-        if _moves(one.effect)
+        if moves(one.effect)
         for rival in one.aliases
-        if _moves(rival.effect)
+        if moves(rival.effect)
     )
     if pairs:
         return PlanWanted((), pairs)
-    causes = [one for one in found.findings if one.material and _moves(one.effect)]
+    causes = [one for one in found.findings if one.material and moves(one.effect)]
     if causes:
         return PlanWanted(tuple((_named(system, one), None) for one in causes))
     blind: dict[NamedEffect, float | None] = {}
     for spot in found.informative.blind_to:
-        if _moves(spot.effect):
+        if moves(spot.effect):
             name = _spelt(system, spot.effect, spot.sensor, spot.stage)
             known = blind.get(name)
             limit = SHARE * abs(spot.turns_at)
@@ -45,7 +45,8 @@ def _demand_same(system: System, found: Diagnosis) -> None:
             )
 
 
-def _moves(effect: str) -> bool:
+def moves(effect: str) -> bool:
+    """Whether an effect moves the mean error, so that a drive can show it."""
     known = registry().get(effect)
     return known is not None and known.sensitivity is not None
 
@@ -58,9 +59,10 @@ def _spelt(system: System, effect: str, sensor: str, stage: str) -> NamedEffect:
     return NamedEffect(effect, sensor, stage if len(system.stages) > 1 else None)
 
 
-def _sizes(one: Finding) -> dict[str, float]:
+def sizes_of(one: Finding) -> dict[str, float]:
+    """What was found of an effect, by its parameters."""
     return {
-        name: abs(float(e.value))
+        name: float(e.value)
         for name, e in one.parameters.items()
         if not isinstance(e.value, str) and e.seen
     }

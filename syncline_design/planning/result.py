@@ -118,7 +118,7 @@ class Plan(Record):
     far, though another drive tells them apart.  unseen: what the drive says next to nothing of.
     priors: standard deviations before the drive, SI.  assumed: figures of the platform that the
     spec does not state.  surveyed: whether the targets were there already, and the drive is laid
-    beside them.
+    beside them.  sized: whether pairs are judged at a size that is known, beyond first order.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -145,6 +145,7 @@ class Plan(Record):
     origin_deg_m: tuple[float, float, float] | None
     provenance: PlanProvenance
     flown: Flown | None = optional()
+    sized: bool | None = optional()
 
     @property
     def exit_code(self) -> int:

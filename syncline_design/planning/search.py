@@ -281,7 +281,11 @@ def pair_ratio(information: Array, pair: PairGoal) -> float:
 
 
 def noncentrality_of(information: Array, pair: PairGoal) -> float:
-    """Of the effect named first where its size is known, else of the weaker of the two."""
+    """Of the effect named first where its size is known, beyond first order where that can be;
+    else of the weaker of the two."""
+    if pair.beyond is not None:
+        own, rival = pair.beyond
+        return max(float(schur(information, (own,), rival)[0, 0]), 0.0)
     if pair.known:
         return float(pair.sizes @ schur(information, pair.first, pair.second) @ pair.sizes)
     return min(

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from syncline_design.diagnosis.result import Diagnosis
+from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
+from syncline_design.planning.beyond import BeyondFirst, beyond_first
 from syncline_design.planning.drives import WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
 from syncline_design.planning.from_diagnosis import asked_of
@@ -46,6 +49,7 @@ from syncline_design.spec.case import Case
 NOTHING_ASKED: Final = PlanWanted()
 DEFAULT_HZ: Final = 10.0
 SECONDS: Final = 60.0
+BEST_LEGS: Final = 5.0  # times as much as all legs on average, in the same time
 MOST_OF_ALL: Final = 1e4  # times all legs: what that does not tell apart, no drive does
 
 
@@ -85,12 +89,15 @@ class Setup:
         world = _world(case, system, request)
         asked = _asked(system, world.every, request)
         in_force().doing("looking at the legs")
-        noise_m, per_unit = _sizes(world)
-        goal = goal_of(system, world.every, asked, noise_m, per_unit)
+        view = _sampled(world)
+        goal = goal_of(system, world.every, asked, *_sizes(world, view))
+        goal, beyond = _beyond_first(view, world.every, goal)
+        world = replace(world, beyond=beyond)
         prior = np.array([one.prior for one in world.every])
         told = world.looked_at(_legs_of(world, goal))
         library = np.sum([t.at(h, SECONDS * h) for t in told for h in range(4)], axis=0)
-        goal, apart = _separable(system, world.every, goal, library)
+        share = BEST_LEGS * SECONDS * request.minutes / (4.0 * sum(t.leg.duration_s for t in told))
+        goal, apart = _separable(goal, library, share)
         others = others_of(world.every, goal, library, prior)
         return cls(case, request, world, goal, PlanJudge(goal, prior, others), told, apart)
 
@@ -149,8 +156,8 @@ def _legs_of(world: World, goal: Goal) -> tuple[Leg, ...]:
     return tuple(leg for leg in world.legs if leg.stage in stages)
 
 
-def _sizes(world: World) -> tuple[float, Array]:
-    """RMS error [m] that the noise makes, and that one unit of every unknown makes."""
+def _sampled(world: World) -> Scene:
+    """A log of all legs one after the other, as far as every stage has some."""
     stages = range(len(world.vehicles))
     every = [joined([g.course for g in world.legs if g.stage == k]) for k in stages]
     shortest = min(len(course) for course in every)
@@ -158,23 +165,42 @@ def _sizes(world: World) -> tuple[float, Array]:
         type(c)(c.ahead[:shortest], c.right[:shortest], c.down[:shortest], c.turn[:shortest])
         for c in every
     ]
-    view = world.view(world.driven(cut))
+    return world.view(world.driven(cut))
+
+
+def _sizes(world: World, view: Scene) -> tuple[float, Array]:
+    """RMS error [m] that the noise makes, and that one unit of every unknown makes."""
     structure, level = world.noise(view)
     visible = np.isfinite(view.log.truth_m)
     return noise_rms_m(structure, level, visible), rms_per_unit(columns(view, world.every))
 
 
-def _separable(
-    system: System, every: Sequence[Unknown], goal: Goal, library: Array
-) -> tuple[Goal, tuple[str, ...]]:
+def _beyond_first(
+    view: Scene, every: Sequence[Unknown], goal: Goal
+) -> tuple[Goal, tuple[BeyondFirst, ...]]:
+    """Pairs whose size is known, beyond first order: where their columns follow the unknowns'."""
+    pairs, found, at = [], [], len(every)
+    for pair in goal.pairs:
+        one = beyond_first(view, every, pair)
+        if one is not None:
+            pair = replace(pair, beyond=(at, tuple(range(at + 1, at + one.width))))
+            found.append(one)
+            at += one.width
+        pairs.append(pair)
+    return replace(goal, pairs=tuple(pairs)), tuple(found)
+
+
+def _separable(goal: Goal, library: Array, share: float) -> tuple[Goal, tuple[str, ...]]:
     """The goal without further pairs that no drive tells apart, and these in words.
 
     The pair that is named first stays: then no drive reaches it, and the plan says so.
+    share: of the library, what the best legs tell at most in the minutes that are given; what is
+    another beyond first order only has to show in that, or it would hold up all others.
     """
     kept, apart = list(goal.pairs[:1]), []
     for pair in goal.pairs:
-        lost = pair_ratio(MOST_OF_ALL * library, pair) > 1.0
-        if lost:
+        most = share if pair.beyond is not None and len(goal.pairs) > 1 else MOST_OF_ALL
+        if pair_ratio(min(most, MOST_OF_ALL) * library, pair) > 1.0:
             apart.append(f"{pair.names[0]} and {pair.names[1]}")
         elif pair not in kept:
             kept.append(pair)

@@ -25,7 +25,6 @@ from syncline_design.planning.information import (
     canonical_correlation,
     fisher,
     sigmas,
-    with_shift,
 )
 from syncline_design.planning.path import PathStates
 from syncline_design.planning.planned_log import Drive
@@ -126,6 +125,7 @@ class Telling:
                 self.setup.case.catalogs_sha256,
             ),
             flown=self._flown(),
+            sized=bool(self.setup.world.beyond) or None,
         )
         vehicle = self.setup.world.vehicles[found.stretches[-1].leg.stage]
         others = {
@@ -263,7 +263,7 @@ class Telling:
         view = scene(inputs.system, inputs.log, inputs.known)
         own = replace(self.setup.world, rate_hz=self.setup.world.computed_hz)
         structure, level = own.noise(view)
-        information = fisher(structure, level, with_shift(view, self.setup.world.every))
+        information = fisher(structure, level, self.setup.world.columns(view))
         ratios = self.setup.judge.ratios(information, exact=True)
         return Flown(
             tuple(path.name for path in self.setup.request.flown),

@@ -16,6 +16,7 @@ import numpy as np
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import UnitError, parse_quantity, suffix_unit
 from syncline_design.model.system import System
 from syncline_design.planning.information import Unknown
@@ -25,6 +26,7 @@ _NAME: Final = re.compile(
     r"\s*(?P<effect>\w+)\s*\(\s*(?:(?P<stage>[^().]+)\.)?(?P<sensor>\w+)\s*\)\s*"
 )
 _EXAMPLE: Final = 'such as "latency(position)=1 ms, lever_arm(position)=1 cm"'
+SIZE_DIGITS: Final = 3  # of a size that a command names
 MATERIAL: Final = 0.2  # of the RMS that the noise makes: what an effect has to make to matter
 TOLERANCE: Final = 0.1  # of the same: how well an effect is to be known where nothing is said
 
@@ -93,6 +95,46 @@ def _demand_known(name: str, sensor: str, option: str) -> None:
         raise PlanError(f"{option}: {name}({sensor}) {why}; expected an effect that moves the mean")
 
 
+def separate_of(first: str, second: str) -> tuple[EffectPair, ...]:
+    """`latency(position)=100 ms` and what to tell it from, one effect or several.
+
+    The size may be left out; of an effect with several parameters it is a list, `[1 cm, 0, 2 cm]`.
+    """
+    name, mark, amount = first.partition("=")
+    one = named(name, "--separate")
+    sizes = _stated_sizes(one, amount.strip()) if mark else {}
+    return tuple(EffectPair(one, named(text, "--separate"), sizes) for text in second.split(","))
+
+
+def _stated_sizes(one: NamedEffect, amount: str) -> dict[str, float]:
+    """The parameters of an effect as they are written."""
+    names = [p.name for p in registry()[one.effect].slopes()]
+    parts = amount.removeprefix("[").removesuffix("]").split(",")
+    where = f"--separate {one.text}={amount}"
+    if len(parts) != len(names):
+        raise PlanError(f"{where}: expected {len(names)} size{'s'[: len(names) != 1]}, "
+                        f"of {', '.join(names)}; found {len(parts)}")  # fmt: skip
+    found = {}
+    for key, text in zip(names, parts, strict=True):
+        try:
+            kind = suffix_unit(key)[1]
+            found[key] = float(parse_quantity(_numbered(text.strip()), kind, tolerance=False))
+        except UnitError as error:
+            raise PlanError(f"{where}: {key} is no such quantity: {error}") from None
+    if not any(found.values()) or not all(map(math.isfinite, found.values())):
+        raise PlanError(f"{where}: expected a size other than 0")
+    return found
+
+
+def sized_text(one: NamedEffect, sizes: Mapping[str, float]) -> str:
+    """An effect with its size as `separate_of` reads it; without, where not all of it is known."""
+    names = [p.name for p in registry()[one.effect].slopes()]
+    if not all(name in sizes for name in names) or not any(sizes.values()):
+        return one.text
+    parts = [format_quantity(sizes[name], suffix_unit(name)[1], SIZE_DIGITS) for name in names]
+    return f"{one.text}={parts[0] if len(parts) == 1 else '[' + ', '.join(parts) + ']'}"
+
+
 def reach_of(text: str) -> tuple[tuple[NamedEffect, float | None], ...]:
     """`latency(position)=1 ms, lever_arm(position)=1 cm` read; each tolerance in its unit."""
     found: list[tuple[NamedEffect, float | None]] = []
@@ -138,6 +180,8 @@ class PairGoal:
     """A pair by the places of its parameters among the unknowns; sizes of the first's, SI.
 
     known: whether the sizes are found ones; otherwise every direction of the effect counts.
+    beyond: where the columns of the pair beyond first order stand (`beyond`), the first's own and
+    then the second's; None where it is judged to first order.
     """
 
     first: tuple[int, ...]
@@ -146,6 +190,7 @@ class PairGoal:
     sizes: Array
     second_sizes: Array
     known: bool
+    beyond: tuple[int, tuple[int, ...]] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -104,13 +104,20 @@ def _drive(plan: NextDrive | None) -> list[Node]:
     if plan.minutes is None:
         return [Text((f"{plan.why_none}: ", code(plan.command)))]
     length = numbers.typeset(f"{numbers.number(plan.minutes, 2)} min")
-    words = f"This log cannot tell {plan.first} from {plan.second}. A drive of {length} does:"
+    told = sentence_list([plan.second, *(plan.others or ())])
+    words = f"This log cannot tell {plan.first} from {told}. A drive of {length} does:"
     if not plan.reached:
         least = numbers.typeset(f"{numbers.number(plan.least_minutes or plan.minutes, 2)} min")
-        words = f"This log cannot tell {plan.first} from {plan.second}. It takes {least} of:"
+        words = f"This log cannot tell {plan.first} from {told}. It takes {least} of:"
     targets = f", over {plan.targets} surveyed targets" if plan.targets else ""
     more = f"Whole, with waypoints{targets}: "
-    return [Text(words), Items(plan.legs), Text((more, code(plan.command)))]
+    nodes: list[Node] = [Text(words), Items(plan.legs), Text((more, code(plan.command)))]
+    if plan.inseparable:
+        lost = sentence_list(plan.inseparable)
+        nodes.append(
+            Text(f"No drive of this platform tells it from {lost} in ten minutes, at this size.")
+        )
+    return nodes
 
 
 def _items(lines: Sequence[str]) -> list[Node]:
@@ -223,7 +230,9 @@ def _facts(found: Diagnosis) -> list[tuple[str, str]]:
 def _findings(found: Diagnosis) -> list[Node]:
     """Material causes each at length, then the noise, what is immaterial, and what is left."""
     nodes: list[Node] = [
-        finding_node(one) for one in found.findings if one.material and one.kind != "noise"
+        finding_node(one, found.plan)
+        for one in found.findings
+        if one.material and one.kind != "noise"
     ]
     if lines := noise_lines(found.findings):
         nodes.append(Items(tuple(lines)))
@@ -275,7 +284,20 @@ def _varying_text(found: Finding, varying: Sequence[Stretch]) -> str:
     )
 
 
-def finding_node(found: Finding) -> Node:
+def _apart(found: Finding, aliases: Sequence[Rival], drive: NextDrive | None) -> str:
+    """What would tell a finding from its aliases; that nothing does where none of them is told."""
+    lost = drive.inseparable or () if drive is not None and drive.first in _spelt(found) else ()
+    if lost and all(any(name in lost for name in _spelt(one)) for one in aliases):
+        return "No drive of this platform does in ten minutes, at this size."
+    return f"To separate them: {found.separated_by}."
+
+
+def _spelt(one: Finding | Rival) -> tuple[str, str]:
+    """An effect as plans spell it, in a system of one stage and in a chain."""
+    return f"{one.effect}({one.sensor})", f"{one.effect}({one.stage}.{one.sensor})"
+
+
+def finding_node(found: Finding, drive: NextDrive | None = None) -> Node:
     """One finding: its figures, how sure it is, what else it could be."""
     facts = [(_spaced(split_suffix(n)[0]), _parameter_text(p)) for n, p in found.parameters.items()]
     nodes: list[Node] = [
@@ -291,7 +313,7 @@ def finding_node(found: Finding) -> Node:
     open_ = [a for a in found.aliases if a not in unlikely]
     if open_:
         names = sentence_list([_alias_text(one) for one in open_])
-        apart = f"To separate them: {found.separated_by}."
+        apart = _apart(found, open_, drive)
         who = "This log" if found.scope is None else "These logs"
         words = f"{who} cannot tell it apart from {names}. {apart}"
         nodes.append(Text(words, mark="!", tone="warn"))

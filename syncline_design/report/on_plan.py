@@ -36,6 +36,7 @@ UNITS: Final = {
 }  # fmt: skip
 Row = tuple[Cell | str, ...]
 FIRST_ORDER: Final = "as far as their effects of first order go"  # a large lag is no latency
+AT_SIZE: Final = "at the size that is known, in these minutes"
 MOST_TARGETS: Final = 12  # told outside the page
 
 
@@ -86,7 +87,7 @@ def _sentences(found: Plan) -> Iterator[str]:
             below = f"No drive as short as {given} was found: below is one of {length}."
         yield f"The least that is enough: {least}. {below}"
     for words in found.inseparable:
-        yield f"No drive of this platform tells {words} apart, {FIRST_ORDER}."
+        yield f"No drive of this platform tells {words} apart, {_how_far(found)}."
     if found.reached and not found.confused:
         yield (
             "All that is asked is reached, and none of the other effects that a drive can tell "
@@ -94,6 +95,11 @@ def _sentences(found: Plan) -> Iterator[str]:
         )
     if found.confused:
         yield f"Left free one at a time, these would take it: {', '.join(found.confused)}."
+
+
+def _how_far(found: Plan) -> str:
+    """In which sense effects are not told apart."""
+    return AT_SIZE if found.sized else FIRST_ORDER
 
 
 def _minutes(minutes: float) -> str:
@@ -274,7 +280,8 @@ def _open(found: Plan) -> list[Node]:
         nodes.append(
             Items(
                 tuple(
-                    f"{one}: no drive tells them apart, {FIRST_ORDER}" for one in found.inseparable
+                    f"{one}: no drive tells them apart, {_how_far(found)}"
+                    for one in found.inseparable
                 )
             )
         )
