@@ -18,9 +18,10 @@ from typer.testing import CliRunner, Result
 
 import syncline_design as sd
 from browsing import flaws_of
-from syncline_design.campaign.changes import REACH, RUNS_KNOWN, Changes, weight_of
+from syncline_design.campaign.changes import REACH, Changes, weight_of
 from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
 from syncline_design.campaign.pool import pool_of
+from syncline_design.campaign.scatter import RUNS_KNOWN
 from syncline_design.campaign.store import Stored, add_looks, add_run, read_store
 from syncline_design.campaign.watch_result import Watch
 from syncline_design.campaign.watching import Watching, WatchRequest
@@ -75,7 +76,7 @@ def series(seed: int, runs: int, change: np.ndarray, since: int) -> list[Suffici
 def test_the_evidence_is_that_of_the_dense_normal_density(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scores of all runs together, before and after the change is marginalised, where it is known
     that no effect differs from run to run."""
-    monkeypatch.setattr("syncline_design.campaign.changes.RUNS_KNOWN", 1e9)
+    monkeypatch.setattr("syncline_design.campaign.scatter.RUNS_KNOWN", 1e9)
     found = series(3, 6, np.array([4.0, 0, 0, 0, 0]) * BOUND, 4)
     changes = Changes(pool_of(found, range(6)))
     p = len(LABELS)

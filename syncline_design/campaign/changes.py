@@ -17,6 +17,8 @@ scatter, before k and from k on each about its own mean, of f free values:
     Q = s' N^-1 s,   h = s' (N + D^-1)^-1 s,   d ~ N(0, phi D),
 a Student ratio: one day far off is a change where its runs agreed before, and none where they do
 not or where they are few.  v = RUNS_KNOWN, which many runs outweigh.
+An effect that clearly differs from run to run is freed in each run to the extent that it does, for
+its scatter moves the others, by other amounts in runs that are driven otherwise.
 Mixed over effects with weights w_c (the common ones have more) and over k with weights w_k, each of
 sum one (changes that did not happen yet count one), E_n = sum w_k w_c B_ck is an e-process: without
 a change it reaches 1 / alpha at any look, of however many, with a chance of at most alpha (Ville's
@@ -37,17 +39,18 @@ import numpy as np
 
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
+from syncline_design.campaign.scatter import Scatter, freed_of, log_bayes, scattered
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
 EARLY: Final = 10.0  # runs after which a change is met half as often as at the first
-RUNS_KNOWN: Final = 12.0  # runs that the noise fitted counts for, against the scatter of runs
 PLAUSIBLE: Final = 2.0  # standard deviations within which a constant is that no run shows
 SHOWN_NATS: Final = 2.0  # beyond one a parameter, from which runs show a constant
 MOST_SHOWN: Final = 8
-MOST_LOG: Final = 690.0
+SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
+MOST_SCATTERED: Final = 2
 
 
 def weight_of(k: int) -> float:
@@ -85,31 +88,13 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Scatter:
-    """Of runs parted at every k from 1, and not parted, by term of a group: (look, G).
+class Runs:
+    """Information and score of runs, their sum with the prior, and the scatter of each effect."""
 
-    shape: (v + f + p) / 2 and scale: v + R of the law of their variance over that fitted; R is
-    taken as f at least, for what the noise inside runs makes is always there.
-    """
-
-    shape: Array
-    scale: Array
-    size: int
-
-    @classmethod
-    def of(cls, squares: Array, seen: Index, group: Group) -> Scatter:
-        """squares (look, G): R; seen (look, G): parameters that each run says anything of."""
-        size = group.index.shape[1]
-        before = np.cumsum(seen, axis=0)
-        after = before[-1] - before
-        free = np.maximum(before - size, 0) + np.maximum(after - size, 0)
-        scale = RUNS_KNOWN + np.maximum(squares, free)
-        return cls(0.5 * (RUNS_KNOWN + free + size), scale, size)
-
-    @property
-    def factor(self) -> Array:
-        """The variance over that fitted, as far as it is known."""
-        return self.scale / (2.0 * self.shape - self.size)
+    normal: Array
+    score: Array
+    total: Array
+    scatters: tuple[Scatter, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,10 +184,10 @@ class Changes:
     def _factors(self, look: int) -> Array:
         """log B_ck of every k from 1 and c, (look - 1, C)."""
         found = np.zeros((look - 1, len(self.terms)))
-        parts = zip(self.groups, *self._freed(look), self._scatters(look), strict=True)
+        parts = zip(self.groups, *self._freed(look), self._runs(look).scatters, strict=True)
         for group, normal, score, scatter in parts:
             inside = self._inside(look)[group.terms]
-            found[:, group.terms] = _log_bayes(
+            found[:, group.terms] = log_bayes(
                 normal / inside[:, None, None],
                 score / inside[:, None],
                 self._reach(look, group),
@@ -231,8 +216,8 @@ class Changes:
         """N (look - 1, G, p, p) and s (look - 1, G, p) of every k from 1, by group of terms."""
         if look in self._last:
             return self._last[look]
-        normal, score = self.pool.normal[:look], self.pool.score[:look]
-        inverse = _pseudo_inverse(self._total(look))
+        runs = self._runs(look)
+        normal, score, inverse = runs.normal, runs.score, _pseudo_inverse(runs.total)
         later = np.cumsum(normal[::-1], axis=0)[::-1][1:]
         scores = np.cumsum(score[::-1], axis=0)[::-1][1:]
         cross = later @ inverse
@@ -247,12 +232,12 @@ class Changes:
 
     def _reach(self, look: int, group: Group) -> Array:
         """D (G, p, p): REACH^2 times one run's covariance, by how the runs were driven."""
-        return REACH**2 * inverted(self.pool.normal[:look].mean(axis=0)[group.blocks])
+        return REACH**2 * inverted(self._runs(look).normal.mean(axis=0)[group.blocks])
 
     def temper(self, look: int) -> Array:
         """Variance over that fitted, of every k from 1 and c: inside runs, and between them."""
         found = np.zeros((look - 1, len(self.terms)))
-        for group, scatter in zip(self.groups, self._scatters(look), strict=True):
+        for group, scatter in zip(self.groups, self._runs(look).scatters, strict=True):
             found[:, group.terms] = scatter.factor[:-1]
         return np.asarray(self._inside(look) * found)
 
@@ -270,33 +255,62 @@ class Changes:
     def between_of(self, k: int) -> Array:
         """The same of one k, (C,)."""
         found = np.ones(len(self.terms))
-        for group, scatter in zip(self.groups, self._scatters(k), strict=True):
+        for group, scatter in zip(self.groups, self._runs(k).scatters, strict=True):
             found[group.terms] = scatter.factor[-1]
         return found
 
-    def _scatters(self, look: int) -> tuple[Scatter, ...]:
-        """Of the first `look` runs parted at every k from 1, and not parted, by group of terms.
+    @cached_property
+    def _latest(self) -> dict[int, Runs]:
+        return {}
 
-        Cochran's Q of each effect alone, the values of all others those of these runs together.
-        """
-        known = _values(self._total(look), self.pool.score[:look].sum(axis=0))
-        left = self.pool.score[:look] - self.pool.normal[:look] @ known
+    def _runs(self, look: int) -> Runs:
+        """The first `look` runs, what clearly differs from one to the next freed in each."""
+        if look not in self._latest:
+            found = self._compared(look, self.pool.normal[:look], self.pool.score[:look])
+            for _ in range(MOST_SCATTERED):
+                one = self._scattering(found)
+                if one is None:
+                    break
+                found = self._compared(look, *freed_of(found.normal, found.score, *one))
+            self._latest.clear()
+            self._latest[look] = found
+        return self._latest[look]
+
+    def _compared(self, look: int, normal: Array, score: Array) -> Runs:
+        """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
+        together; parted at every k from 1, and not parted."""
+        total = self._total(look, normal, score)
+        left = score - normal @ _values(total, score.sum(axis=0))
         found = []
-        for g, inverse in zip(self.groups, self._inverses, strict=True):
-            normal = self.pool.normal[:look, *g.blocks]
-            squares = _scattered(normal, inverse[:look], left[:, g.index])
-            seen = np.sum(np.einsum("rgaa->rga", normal) > 0.0, axis=-1)
-            found.append(Scatter.of(squares / self._inside(look)[g.terms], seen, g))
-        return tuple(found)
+        for g in self.groups:
+            blocks = normal[:, *g.blocks]
+            squares = scattered(blocks, inverted(blocks), left[:, g.index])
+            seen = np.sum(np.einsum("rgaa->rga", blocks) > 0.0, axis=-1)
+            found.append(Scatter.of(squares / self._inside(look)[g.terms], seen, g.index.shape[1]))
+        return Runs(normal, score, total, tuple(found))
 
-    def _total(self, look: int) -> Array:
-        """Information of the first `look` runs together, with the prior of what they show."""
-        total = self.pool.normal[:look].sum(axis=0)
+    def _scattering(self, runs: Runs) -> tuple[Index, Array] | None:
+        """The effect that differs most clearly from run to run, and the covariance by which it does
+        beyond noise; None where noise would do.  One change is none: runs are parted at any."""
+        best, found = SCATTERED, None
+        for g, scatter in zip(self.groups, runs.scatters, strict=True):
+            least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
+            clear = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
+            k = int(np.argmax(clear))
+            if clear[k] > best:
+                own = g.index[k]
+                usual = inverted(runs.normal.mean(axis=0)[np.ix_(own, own)])
+                best, found = clear[k], (own, (least[k] / free[k] - 1.0) * usual)
+        return found
+
+    def _total(self, look: int, normal: Array, score: Array) -> Array:
+        """Information of runs together, with the prior of what they show."""
+        total = normal.sum(axis=0)
         prior = np.diag(total) / PLAUSIBLE**2
-        shown = self._shown(total, self.pool.score[:look].sum(axis=0), self._inside(look))
-        index = np.concatenate([self.terms[c].index for c in shown] or [[]]).astype(np.int64)
-        prior[index] = self.prior[index]
-        return total + np.diag(np.maximum(prior, self.prior))
+        for c in self._shown(total, score.sum(axis=0), self._inside(look)):
+            prior[self.terms[c].index] = 0.0
+        found: Array = total + np.diag(np.maximum(prior, self.prior))
+        return found
 
     def _shown(self, total: Array, score: Array, inside: Array) -> list[int]:
         """Effects that runs together show as constants: forward, the one that gains most first."""
@@ -317,11 +331,6 @@ class Changes:
             score = score - total[:, index] @ inverse @ score[index]
             total = total - total[:, index] @ inverse @ total[index]
         return found
-
-    @cached_property
-    def _inverses(self) -> tuple[Array, ...]:
-        """Covariances of each effect alone by each run, (L, G, p, p), by group of terms."""
-        return tuple(inverted(self.pool.normal[:, *g.blocks]) for g in self.groups)
 
     def without(self, one: Change) -> Changes:
         """The same runs with a change taken off those that have it."""
@@ -360,39 +369,3 @@ def _scatter(normal: Array, normals: Array, scores: Array, index: Index) -> floa
         return 1.0
     spread = (count - 1) / count * np.einsum("ga,ab,gb->", off, normal[index[:, None], index], off)
     return float(spread) / seen
-
-
-def _scattered(normals: Array, inverses: Array, scores: Array) -> Array:
-    """Cochran's Q of runs before k and of those from k on, together, k from 1 to all, (n, G).
-
-    normals, inverses (n, G, p, p) of single runs and their scores (n, G, p).
-    """
-    square = np.einsum("rga,rgab,rgb->g", scores, inverses, scores)
-    before, moved = np.cumsum(normals, axis=0), np.cumsum(scores, axis=0)
-    found: Array = square - _explained(before, moved)
-    found[:-1] -= _explained(before[-1] - before[:-1], moved[-1] - moved[:-1])
-    return np.maximum(found, 0.0)
-
-
-def _explained(normal: Array, score: Array) -> Array:
-    """s' N^-1 s."""
-    found: Array = np.einsum("kga,kgab,kgb->kg", score, inverted(normal), score)
-    return found
-
-
-def _log_bayes(normal: Array, score: Array, reach: Array, scatter: Scatter) -> Array:
-    """log B of N (n, G, p, p), s (n, G, p) and D (G, p, p), which may have no inverse."""
-    values, vectors = np.linalg.eigh(reach)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-    inner = np.eye(reach.shape[-1]) + np.swapaxes(root, -1, -2) @ normal @ root
-    turned = (score[:, :, None, :] @ root)[:, :, 0, :]
-    if reach.shape[-1] == 1:
-        size, square = np.log(inner[..., 0, 0]), turned[..., 0] ** 2 / inner[..., 0, 0]
-    else:
-        size = np.linalg.slogdet(inner)[1]
-        solved = np.linalg.solve(inner, turned[..., None])[..., 0]
-        square = np.sum(turned * solved, axis=-1)
-    left = np.maximum(_explained(normal, score) - square, 0.0)
-    student = scatter.shape[:-1] * np.log1p(square / (scatter.scale[:-1] + left))
-    found: Array = np.minimum(student - 0.5 * size, MOST_LOG)
-    return found

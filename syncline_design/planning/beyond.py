@@ -43,7 +43,8 @@ class BeyondFirst:
         """q and S [m], (n, 3, width); zero where nothing is known."""
         apart = view.error((self.second,)) - view.error((self.first,))
         both = np.concatenate([apart[:, :, None], slopes(view, [self.second])], axis=2)
-        return np.nan_to_num(both)
+        found: Array = np.nan_to_num(both)
+        return found
 
 
 def beyond_first(view: Scene, every: Sequence[Unknown], pair: PairGoal) -> BeyondFirst | None:

@@ -113,7 +113,7 @@ def _drive(plan: NextDrive | None) -> list[Node]:
     more = f"Whole, with waypoints{targets}: "
     nodes: list[Node] = [Text(words), Items(plan.legs), Text((more, code(plan.command)))]
     if plan.inseparable:
-        lost = sentence_list(plan.inseparable)
+        lost = sentence_list(list(plan.inseparable))
         nodes.append(
             Text(f"No drive of this platform tells it from {lost} in ten minutes, at this size.")
         )
