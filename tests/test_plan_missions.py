@@ -1,0 +1,169 @@
+"""Plans of vehicles that do not hover, and of a chain, as missions and KML, by their formats.
+
+Oracles: the developer guide's keys of a plan file, the order of OGC's schema, pymap3d.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import jsonschema
+import numpy as np
+import pymap3d
+import pytest
+
+import syncline_design as sd
+from syncline_design.planning.telling import PlanRun
+from syncline_design.report.plans import render_plan
+from tests.world import make_log, scenario
+
+ORIGIN = (47.3, 8.55, 460.0)
+STAMPED = "timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}"
+SPEC = f"""\
+syncline: 1
+name: vehicle
+requirements: [{{id: ACC-1, kind: accuracy, limit: 10 m}}]
+stages:
+  - name: vehicle
+    platform: PLATFORM
+    position: {{sensor: {{modality: position, type: gnss, sigma_position: 0.02 m,
+      primitives: [pps]}}, primitive: pps, {STAMPED}, lever_arm: [0.25 m, -0.1 m, -0.4 m]}}
+    attitude: {{sensor: {{modality: attitude, type: ins, sigma_attitude: 0.05 deg,
+      primitives: [pps]}}, primitive: pps, {STAMPED}}}
+    ranging: {{sensor: {{modality: ranging, type: lidar, sigma_range: 0.02 m,
+      sigma_bearing: [0.02 deg, 0.02 deg], primitives: [pps]}}, primitive: pps, {STAMPED},
+      lever_arm: [0.15 m, 0.05 m, 0.2 m]}}
+log: {{origin: [47.3 deg, 8.55 deg, 460 m]}}
+"""
+
+VEHICLES = {
+    "fixed_wing": "v_max: 25 m/s, omega_max: 30 deg/s, distance: 150 m",
+    "surface": "v_max: 5 m/s, omega_max: 10 deg/s, distance: 60 m",
+    "underwater": "v_max: 2 m/s, omega_max: 15 deg/s, distance: 50 m",
+}
+MAV_TYPES = {"fixed_wing": 1, "surface": 11, "underwater": 12}
+ITEM = {
+    "type": "object",
+    "required": ["autoContinue", "command", "doJumpId", "frame", "params", "type"],
+    "properties": {
+        "autoContinue": {"type": "boolean"},
+        "command": {"enum": [16, 22, 178]},
+        "doJumpId": {"type": "integer", "minimum": 1},
+        "frame": {"enum": [2, 3]},
+        "params": {
+            "type": "array", "minItems": 7, "maxItems": 7, "items": {"type": ["number", "null"]}
+        },
+        "type": {"const": "SimpleItem"},
+    },
+}  # fmt: skip
+MISSION = {
+    "type": "object",
+    "required": ["fileType", "geoFence", "groundStation", "mission", "rallyPoints", "version"],
+    "properties": {
+        "fileType": {"const": "Plan"},
+        "version": {"const": 1},
+        "geoFence": {"required": ["circles", "polygons", "version"]},
+        "rallyPoints": {"required": ["points", "version"]},
+        "mission": {
+            "required": ["cruiseSpeed", "firmwareType", "hoverSpeed", "items",
+                         "plannedHomePosition", "vehicleType", "version"],
+            "properties": {
+                "cruiseSpeed": {"type": "number", "exclusiveMinimum": 0},
+                "hoverSpeed": {"type": "number", "exclusiveMinimum": 0},
+                "items": {"type": "array", "minItems": 3, "items": ITEM},
+                "plannedHomePosition": {"type": "array", "minItems": 3, "maxItems": 3},
+                "version": {"const": 2},
+            },
+        },
+    },
+}  # fmt: skip
+# element: its children in their order (OGC 07-147r2, ogckml22.xsd)
+KML_ORDER = {
+    "kml": ["Document"],
+    "Document": ["name", "description", "Placemark"],
+    "Placemark": ["name", "description", "Point", "LineString"],
+    "Point": ["altitudeMode", "coordinates"],
+    "LineString": ["altitudeMode", "coordinates"],
+}
+
+
+@pytest.fixture(scope="module", params=VEHICLES)
+def other(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> PlanRun:
+    """A drive of another kind of vehicle."""
+    path = tmp_path_factory.mktemp("vehicles") / f"{request.param}.yaml"
+    platform = f"{{{VEHICLES[request.param]}, baseline: 1 m, motion: {request.param}}}"
+    path.write_text(SPEC.replace("PLATFORM", platform), encoding="utf-8")
+    return sd.plan(path, reach="latency(position)=5 ms", minutes=30.0)
+
+
+def test_missions_of_other_vehicles_fit_the_format_and_the_vehicle(other: PlanRun) -> None:
+    """The developer guide's keys and kinds; a fixed wing never stops, a boat takes no off."""
+    plan = json.loads(render_plan("qgc", other))
+    jsonschema.validate(plan, MISSION)
+    mission, motion = plan["mission"], other.motion
+    assert mission["vehicleType"] == MAV_TYPES[motion]
+    items = mission["items"]
+    assert [i["command"] == 22 for i in items] == [
+        motion == "fixed_wing",
+        *[False] * len(items[1:]),
+    ]
+    speeds = [i["params"][1] for i in items if i["command"] == 178]
+    most = {"fixed_wing": 25.0, "surface": 5.0, "underwater": 2.0}[motion]
+    least = {"fixed_wing": 0.6, "surface": 0.0, "underwater": 0.3}[motion] * most
+    assert all(least - 0.02 <= speed <= most for speed in speeds)
+    places = [i["params"] for i in items if i["command"] == 16]
+    if least:
+        assert all(params[0] == 0.0 for params in places)  # it cannot hold
+    path = other.path
+    for *_, lat, lon, height in places:
+        local = pymap3d.geodetic2ned(lat, lon, ORIGIN[2] + height, *ORIGIN)
+        assert np.min(np.linalg.norm(path.position_m - np.array(local), axis=1)) < 0.05
+    # driven at these speeds from place to place it takes the time of the path
+    driven_s, speed, before = 0.0, math.nan, None
+    for item in items:
+        if item["command"] == 178:
+            speed = item["params"][1]
+        elif item["command"] == 16:
+            lat, lon, height = item["params"][4:]
+            here = np.array(pymap3d.geodetic2ned(lat, lon, ORIGIN[2] + height, *ORIGIN))
+            if before is not None:
+                far = float(np.linalg.norm(here - before))
+                driven_s += item["params"][0] + (far / speed if far > 0.01 else 0.0)
+            before = here
+    assert driven_s == pytest.approx(path.time_s[-1] - path.time_s[0], rel=0.05)
+
+
+def test_kml_of_other_vehicles_keeps_the_order_of_its_schema(other: PlanRun) -> None:
+    root = ElementTree.fromstring(render_plan("kml", other))
+    space = "{http://www.opengis.net/kml/2.2}"
+    for element in root.iter():
+        name = element.tag.removeprefix(space)
+        children = [child.tag.removeprefix(space) for child in element]
+        order = KML_ORDER.get(name, [])
+        assert all(child in order for child in children), (name, children)
+        assert children == sorted(children, key=order.index)
+    for text in (e.text or "" for e in root.iter(f"{space}coordinates")):
+        for lon, lat, height in (map(float, one.split(",")) for one in text.split()):
+            assert abs(lon - ORIGIN[1]) < 0.2
+            assert abs(lat - ORIGIN[0]) < 0.2
+            assert abs(height - ORIGIN[2]) < 500.0
+
+
+def test_a_chain_is_planned_and_written(tmp_path: Path) -> None:
+    """A vessel and what it tracks: one drives, the other waits, and both paths are written."""
+    path = tmp_path / "chain.yaml"
+    text = make_log(scenario("survey_chain", 3, 20.0, 5.0)).spec_yaml()
+    path.write_text(text + "log: {origin: [47.3 deg, 8.55 deg, 460 m]}\n", encoding="utf-8")
+    found = sd.plan(path, reach="latency(position)=50 ms", minutes=60.0)
+    jsonschema.validate(json.loads(render_plan("qgc", found)), MISSION)
+    header = render_plan("csv", found).splitlines()[0].split(",")
+    (waits,) = found.others
+    assert [name for name in header if name.startswith(f"{waits}_")] == [
+        f"{waits}_{name}" for name in header[1:7]
+    ]
+    root = ElementTree.fromstring(render_plan("kml", found))
+    lines = root.iter("{http://www.opengis.net/kml/2.2}LineString")
+    assert len(list(lines)) == len(found.result.legs)
