@@ -10,7 +10,7 @@ from syncline_design.campaign.pool import Index, inverted
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
-RUNS_KNOWN: Final = 12.0  # runs that the noise fitted counts for, against the scatter of runs
+RUNS_KNOWN: Final = 17.0  # runs that the noise fitted counts for, against the scatter of runs
 MOST_LOG: Final = 690.0
 
 
