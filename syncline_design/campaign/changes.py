@@ -39,7 +39,7 @@ import numpy as np
 
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
-from syncline_design.campaign.scatter import Scatter, freed_of, log_bayes, scattered
+from syncline_design.campaign.scatter import RunScatter, freed_of, log_bayes, scattered
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -94,7 +94,7 @@ class Runs:
     normal: Array
     score: Array
     total: Array
-    scatters: tuple[Scatter, ...]
+    scatters: tuple[RunScatter, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +286,9 @@ class Changes:
             blocks = normal[:, *g.blocks]
             squares = scattered(blocks, inverted(blocks), left[:, g.index])
             seen = np.sum(np.einsum("rgaa->rga", blocks) > 0.0, axis=-1)
-            found.append(Scatter.of(squares / self._inside(look)[g.terms], seen, g.index.shape[1]))
+            found.append(
+                RunScatter.of(squares / self._inside(look)[g.terms], seen, g.index.shape[1])
+            )
         return Runs(normal, score, total, tuple(found))
 
     def _scattering(self, runs: Runs) -> tuple[Index, Array] | None:

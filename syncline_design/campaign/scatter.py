@@ -15,7 +15,7 @@ MOST_LOG: Final = 690.0
 
 
 @dataclass(frozen=True, slots=True)
-class Scatter:
+class RunScatter:
     """Of runs parted at every k from 1, and not parted, by term of a group: (look, G).
 
     shape: (v + f + p) / 2 and scale: v + R of the law of their variance over that fitted; R is
@@ -29,7 +29,7 @@ class Scatter:
     size: int
 
     @classmethod
-    def of(cls, squares: Array, seen: Index, size: int) -> Scatter:
+    def of(cls, squares: Array, seen: Index, size: int) -> RunScatter:
         """squares (look, G): R; seen (look, G): parameters that each run says anything of."""
         before = np.cumsum(seen, axis=0)
         after = before[-1] - before
@@ -72,7 +72,7 @@ def _explained(normal: Array, score: Array) -> Array:
     return found
 
 
-def log_bayes(normal: Array, score: Array, reach: Array, scatter: Scatter) -> Array:
+def log_bayes(normal: Array, score: Array, reach: Array, scatter: RunScatter) -> Array:
     """log B of N (n, G, p, p), s (n, G, p) and D (G, p, p), which may have no inverse."""
     values, vectors = np.linalg.eigh(reach)
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]

@@ -39,7 +39,7 @@ def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
     plan, and never ends without a word on it.
     """
     classes = list(_classes(found, len(case.stages) > 1))[:MOST_TRIED]
-    untold: list[Class] = []
+    untold: list[AliasClass] = []
     now = None
     try:
         with within_s(LIMIT_S):
@@ -56,7 +56,7 @@ def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Class:
+class AliasClass:
     """A finding with its size, and what this log left in its place, the commonest first."""
 
     first: NamedEffect
@@ -72,12 +72,12 @@ class Class:
         """As the command that is printed has them."""
         return separate_of(sized_text(self.first, self.sizes), self.second)
 
-    def only(self, rivals: Sequence[NamedEffect]) -> Class:
+    def only(self, rivals: Sequence[NamedEffect]) -> AliasClass:
         """The same with some of the rivals."""
         return replace(self, rivals=tuple(rivals))
 
 
-def _told(case: Case, one: Class) -> NextDrive | None:
+def _told(case: Case, one: AliasClass) -> NextDrive | None:
     """The drive that tells a finding from all of its class that some drive tells it from.
 
     Where none does in the minutes and in the time of a diagnosis, the one that tells it from the
@@ -95,7 +95,7 @@ def _told(case: Case, one: Class) -> NextDrive | None:
     return None
 
 
-def _whole(case: Case, one: Class, lost: Sequence[NamedEffect]) -> NextDrive | None:
+def _whole(case: Case, one: AliasClass, lost: Sequence[NamedEffect]) -> NextDrive | None:
     """The drive that tells a finding from several at once; None where there is none in time."""
     if len(one.rivals) < 2:
         return None
@@ -114,7 +114,7 @@ _TOO_LATE: Final = (
 )
 
 
-def _untold_words(untold: Sequence[Class]) -> str:
+def _untold_words(untold: Sequence[AliasClass]) -> str:
     pairs = "; ".join(f"{one.first.text} from {r.text}" for one in untold for r in one.rivals)
     return (
         f"No test drive of this platform was found that tells {pairs}, at the size that was found. "
@@ -122,7 +122,9 @@ def _untold_words(untold: Sequence[Class]) -> str:
     )
 
 
-def _none(case: Case, one: Class, why: str, inseparable: Sequence[NamedEffect] = ()) -> NextDrive:
+def _none(
+    case: Case, one: AliasClass, why: str, inseparable: Sequence[NamedEffect] = ()
+) -> NextDrive:
     """No drive, and the command that looks for it."""
     return NextDrive(
         first=one.first.text,
@@ -139,12 +141,12 @@ def _none(case: Case, one: Class, why: str, inseparable: Sequence[NamedEffect] =
     )
 
 
-def _command(case: Case, one: Class) -> list[str]:
+def _command(case: Case, one: AliasClass) -> list[str]:
     first = sized_text(one.first, one.sizes)
     return ["syncline-design", "plan", str(case.path), "--separate", first, one.second]
 
 
-def _classes(found: Diagnosis, several: bool) -> Iterator[Class]:
+def _classes(found: Diagnosis, several: bool) -> Iterator[AliasClass]:
     """Causes that matter with their aliases, the commonest first, as far as a drive can help."""
     for one in found.findings:
         if one.kind == "noise" or not one.material or not moves(one.effect):
@@ -152,14 +154,14 @@ def _classes(found: Diagnosis, several: bool) -> Iterator[Class]:
         aliases = sorted(one.aliases, key=lambda r: registry()[r.effect].rarity)
         rivals = tuple(_named(r, several) for r in aliases if moves(r.effect))
         if rivals:
-            yield Class(_named(one, several), sizes_of(one), rivals)
+            yield AliasClass(_named(one, several), sizes_of(one), rivals)
 
 
 def _named(one: Finding | Rival, several: bool) -> NamedEffect:
     return NamedEffect(one.effect, one.sensor, one.stage if several else None)
 
 
-def _short(case: Case, run: PlanRun, one: Class, lost: Sequence[NamedEffect]) -> NextDrive:
+def _short(case: Case, run: PlanRun, one: AliasClass, lost: Sequence[NamedEffect]) -> NextDrive:
     result = run.result
     command = _command(case, one)
     if not result.reached and result.least_minutes is not None:
