@@ -265,7 +265,7 @@ def hard(*, quick: bool) -> None:
         _hard_row(f"5 roles x 50 x 8, sync limit {limit}", tight)
     per_sensor = replace(instance(2, 50, seed=SEED), sync_model="per_sensor")
     _hard_row("5 roles x 50 x 8, per_sensor", per_sensor)
-    for vehicles in (2, 3, 4) if quick else (2, 3, 4, 5, 6):
+    for vehicles in (2, 3, 4) if quick else (2, 3, 4, 5, 6, 8):
         for boards in (False, True):
             problem = instance(vehicles, 10, seed=SEED, vehicles=vehicles, clocks=3, boards=boards)
             name = f"{vehicles} vehicles x 3 clocks, 10 x 8" + (", boards" if boards else "")

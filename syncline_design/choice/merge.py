@@ -17,18 +17,21 @@ from syncline_design.choice.arrays import Scaled, Tables, tie_order
 from syncline_design.choice.labels import NOT_MET, Addition, Labels, concatenate, extend, total_m
 from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline
+from syncline_design.choice.outlook import Key
 from syncline_design.choice.pareto import Columns, Guard, undominated
-from syncline_design.choice.remaining import Ceiling, StageRoles, StillToCome, lowered, stage_roles
+from syncline_design.choice.remaining import Ceiling, StageRoles, StillToCome, lowered
 from syncline_design.choice.safety import Safety, TimingClass
+from syncline_design.choice.stage_timings import StageTimings
 from syncline_design.choice.stairs import Stairs
 from syncline_design.choice.table import ClockOption, VehicleTable
 
 MANY = 2000  # labels that are looked up in a grid of so many amounts:
 GRID = 128
+WIDER = 4  # times as many as a first pass goes on with are compared with one another
 FEW = 64  # partial designs that are not worth comparing with one another
 
 
-class Merge:
+class Merge(StageTimings):
     """Merging of all roles; `run` gives the complete designs that remain.
 
     useful: the clocks of each vehicle that no other one of it replaces, by place.  most: partial
@@ -47,18 +50,17 @@ class Merge:
         most: int | None = None,
     ) -> None:
         self.most = most
-        self.tables, self.problem, self.ceiling = tables, tables.problem, ceiling
-        vehicles = self.problem.vehicles
-        self.clocks = [[v.clocks[i] for i in own] for v, own in zip(vehicles, useful, strict=True)]
-        self.stages = stage_roles(self.problem)
-        self.rates = {(p.role, p.reference): p.rate_mps for p in self.problem.pairs}
-        self.rate = self.problem.sync_rate_mps
+        super().__init__(tables, useful)
+        self.ceiling = ceiling
         self.per_sensor = self.problem.sync_model == "per_sensor"
         self.accuracy_m = self.problem.limits.accuracy_m if accuracy else None
-        self.offsets = tuple(max(c.offset_bound_s for c in clocks) for clocks in self.clocks)
         self.after = StillToCome(tables, self.stages, self.clocks)
         self.safety = Safety(tables, self.offsets) if guarded else None
         self.capacity = _most_channels(tables)
+        self.number, self.outlook = 0, None
+        known = ceiling is not None and not guarded and tables.keys[0].known
+        if known and self.is_long and self.rate > 0.0 and not self.per_sensor:
+            self.outlook = self.look_ahead()
 
     def run(self, deadline: Deadline) -> Labels | None:
         """Complete designs that no other one replaces; None when there is none."""
@@ -97,12 +99,10 @@ class Merge:
         """Labels after one stage, for each clock of its vehicle and timing of its reference."""
         stage = self.stages[number]
         safety = self.safety
-        for place, clock in enumerate(self.clocks[stage.vehicle]):
+        self.number = number
+        for place, clock in self.by_clock(stage.vehicle):
             group = self._on_clock(labels, number, place)
             offset = clock.offset_bound_s
-            self.offsets = (
-                *self.offsets[: stage.vehicle], offset, *self.offsets[stage.vehicle + 1 :]
-            )  # fmt: skip
             self.safety = None if safety is None else safety.at(stage.vehicle, offset)
             for timing in self._classes(stage, group):
                 deadline.check()
@@ -114,16 +114,11 @@ class Merge:
     def _on_clock(self, labels: Labels, number: int, place: int) -> Labels:
         """Labels whose vehicle has a clock: chosen now where this is the vehicle's first stage."""
         vehicle = self.stages[number].vehicle
-        if not self._is_first(number):
+        if not self.is_first(number):
             return labels.take(labels.clocks[:, vehicle] == place)
         clocks = labels.clocks.copy()
         clocks[:, vehicle] = place
         return replace(labels, clocks=clocks)
-
-    def _is_first(self, number: int) -> bool:
-        """Whether a stage is the first of its vehicle."""
-        before = [stage.vehicle for stage in self.stages[:number]]
-        return self.stages[number].vehicle not in before
 
     def _with_clock(self, labels: Labels, vehicle: int, clock: ClockOption) -> Labels:
         """Labels with what a vehicle's clock takes."""
@@ -159,19 +154,13 @@ class Merge:
         Then every bound grows alike with the reference's (per_sensor: it only adds to a sum); else,
         and where the sync limit is guarded, one for each tau too.  One empty class without any.
         """
-        if stage.reference is None:
-            yield TimingClass(None, 0.0, False, np.zeros(0, dtype=np.intp))
-            return
-        role = self.tables.roles[stage.reference]
-        if self.safety is None and (self.per_sensor or not labels.bound.any()):
+        role = None if stage.reference is None else self.tables.roles[stage.reference]
+        if role is not None and self.safety is None and (self.per_sensor or not labels.bound.any()):
             for host in sorted(set(role.host.tolist())):
                 rows = np.flatnonzero(role.host == host)
                 yield TimingClass(stage.reference, float(role.tau[rows].min()), host, rows, False)
             return
-        pairs = sorted(set(zip(role.tau.tolist(), role.host.tolist(), strict=True)))
-        for tau, host in pairs:
-            rows = np.flatnonzero((role.tau == tau) & (role.host == host))
-            yield TimingClass(stage.reference, tau, host, rows)
+        yield from self.single_classes(stage)
 
     def _stage(
         self, labels: Labels, number: int, timing: TimingClass, clock: ClockOption
@@ -180,17 +169,17 @@ class Merge:
         stage, before = self.stages[number], self.stages[number - 1] if number else None
         if before is not None and before.reference is not None:
             labels = self._chain(labels, before, stage, timing)
-        if self._is_first(number):
+        if self.is_first(number):
             labels = self._with_clock(labels, stage.vehicle, clock)
         for role in stage.leaves:
             keep = partial(self._keep, role=role, timing=timing)
-            labels = extend(labels, self._leaf(role, stage, timing), keep)
+            labels = extend(labels, self.leaf(role, stage, timing), keep)
         if timing.role is None:
             return labels
         keep = partial(self._keep, role=timing.role, timing=timing)
         rate = math.fsum(r for (_, reference), r in self.rates.items() if reference == timing.role)
         options = self.tables.roles[timing.role].take(timing.rows)
-        added = Addition(options, rate, self._used_at(stage), reference=True)
+        added = Addition(options, rate, self.used_at(stage), reference=True)
         return extend(labels, added, keep)
 
     def _chain(
@@ -202,38 +191,11 @@ class Merge:
             return labels
         own = labels.clocks[:, before.vehicle]
         offsets = np.array([c.offset_bound_s for c in self.clocks[before.vehicle]])[own]
-        meets = labels.reference_tau + self._offset(
+        meets = labels.reference_tau + self.offset(
             labels.reference_host, offsets, before.vehicle, timing, stage.vehicle
         )
         labels = replace(labels, meets=meets, sync=labels.sync + rate * meets)
         return labels.take(self._keep(labels, role=before.last, timing=timing))
-
-    def _leaf(self, role: int, stage: StageRoles, timing: TimingClass) -> Addition:
-        options, used_at = self.tables.roles[role], self._used_at(stage)
-        rate = self.rates.get((role, timing.role))
-        if rate is None:
-            return Addition(options, 0.0, used_at)
-        own = np.array(self.offsets[stage.vehicle])
-        if timing.role is None:
-            bound = np.asarray(options.tau + np.where(options.host, own, 0.0))
-            return Addition(options, rate, used_at, bound=bound)
-        offset = self._offset(options.host, own, stage.vehicle, timing, stage.vehicle)
-        return Addition(options, rate, used_at, meets=np.asarray(options.tau + offset))
-
-    def _offset(
-        self, host: Bools, own: Floats, vehicle: int, timing: TimingClass, other: int
-    ) -> Floats:
-        """Offset between timelines: 0 on the same one, else both host clocks' against UTC.
-
-        own: that of the first vehicle's clock.
-        """
-        offset = np.where(host, own, 0.0) + (self.offsets[other] if timing.host else 0.0)
-        if vehicle == other:
-            return np.where(host == timing.host, 0.0, offset)
-        return np.where(host | timing.host, offset, 0.0)
-
-    def _used_at(self, stage: StageRoles) -> int:
-        return stage.vehicle * len(self.tables.tracked)
 
     def _buy(self, labels: Labels, vehicle: int) -> Labels:
         """Channels of a vehicle turned into whole units of shared hardware and paid for."""
@@ -261,17 +223,26 @@ class Merge:
             mask &= self.safety.can_reach(labels, bound, role)
         rows = np.flatnonzero(mask)
         if self.ceiling is not None and len(rows):
-            rows = rows[self._below_ceiling(labels.take(rows), bound[rows], role)]
+            rows = rows[self._below_ceiling(labels.take(rows), bound[rows], role, timing)]
+        if self.most is not None and len(rows) > WIDER * self.most:
+            rows = self._promising(labels, bound, rows, WIDER * self.most)
         if len(rows) <= FEW:
             return rows
         if len(rows) < len(labels):
             labels, bound = labels.take(rows), bound[rows]
         kept = undominated(self._columns(labels, bound, role, timing))
         if self.most is not None and len(kept) > self.most:
-            kept = kept[np.argsort(labels.resources[0][kept], kind="stable")]
-            spread = np.linspace(0, len(kept) - 1, self.most).astype(np.intp)
-            kept = np.sort(kept[spread])
+            kept = self._promising(labels, bound, kept, self.most)
         return rows[kept]
+
+    def _promising(self, labels: Labels, bound: Floats, rows: Indices, most: int) -> Indices:
+        """Of so many groups of rising amounts the one that errs least."""
+        total = labels.error[rows] + self._caused(labels, bound)[rows]
+        order = np.argsort(labels.resources[0][rows], kind="stable")
+        group = np.arange(len(rows)) * most // len(rows)
+        first = np.lexsort((total[order], group))
+        starts = np.flatnonzero(np.append(True, np.diff(group) > 0))
+        return np.sort(rows[order[first[starts]]])
 
     def _columns(self, labels: Labels, bound: Floats, role: int, timing: TimingClass) -> Columns:
         total = labels.error + (labels.sync if self.per_sensor else self.rate * bound)
@@ -324,13 +295,19 @@ class Merge:
         total = error + self._caused(labels, bound)
         return np.asarray(total <= self.accuracy_m * (1.0 + MARGIN))
 
-    def _below_ceiling(self, labels: Labels, bound: Floats, role: int) -> Bools:
+    def _below_ceiling(
+        self, labels: Labels, bound: Floats, role: int, timing: TimingClass
+    ) -> Bools:
         """Labels that may still end cheaper or more accurate than every known design.
 
         Whatever the roles still to come are, they add no less than some step of their staircase.
         """
         assert self.ceiling is not None
-        amount, error = labels.resources[0].astype(np.float64), labels.error
+        amount, error = self._owed(labels), labels.error
+        known = self._known_to(role, timing)
+        if known is not None and self.outlook is not None:
+            total = error + self.problem.fixed_error_m
+            return self.outlook.may_beat(self.ceiling, self.number, *known, amount, total, bound)
         demanded, caused = self._demanded(labels, bound, role), self._caused(labels, bound)
         steps = self.after.steps[role]
         if self.safety is None and len(labels) > MANY:
@@ -345,6 +322,28 @@ class Merge:
             if not len(left):
                 break
         return out
+
+    def _known_to(self, role: int, timing: TimingClass) -> tuple[Key | None, int] | None:
+        """Where in its stage the outlook looks on from; None where it does not."""
+        stage = self.stages[self.number]
+        if self.outlook is None:
+            return None
+        if role == stage.last:
+            return None, 0
+        key = (self.number, self.clock, timing.tau_s, timing.host)
+        if not timing.single or key not in self.outlook.rest:
+            return None
+        return key, 0 if role < stage.first else stage.leaves.index(role) + 1
+
+    def _owed(self, labels: Labels) -> Floats:
+        """Amounts so far, with the shared hardware in use that is not yet paid for."""
+        amount, scale = labels.resources[0].astype(np.float64), self.tables.keys[0]
+        for at, used in enumerate(labels.used):
+            item = self.problem.infrastructure[self.tables.tracked[at % len(self.tables.tracked)]]
+            if scale.known and used.any():
+                each = scale.whole(item.resources.of(scale.name))
+                amount = amount + float(each) * -(-used // item.channels)
+        return amount
 
     def _below_on_grid(self, amount: Floats, total: Floats, steps: Stairs) -> Bools:
         """The same for many labels: what each amount leaves to err, looked up in a grid of them.

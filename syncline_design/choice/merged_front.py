@@ -43,12 +43,13 @@ from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.remaining import Ceiling, lowered
 from syncline_design.choice.searched_front import searched_front
+from syncline_design.choice.stage_timings import StageTimings
 from syncline_design.choice.table import ClockOption, Design, Nearer, Problem, is_empty
 from syncline_design.machine.deadline import in_force, within
 from syncline_design.machine.quick_dataclass import dataclass
 
 APART = 3e-11  # errors that differ by a larger share differ in their 12 figures
-ROUGH = 100  # partial designs that a first pass goes on with, to know what the others must beat
+ROUGH = (100, 300)  # partial designs that first passes go on with, to know what others must beat
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,10 +161,13 @@ def _merge_all(
     """Complete designs with every clock that may matter, the front of them."""
     useful = tuple(useful_clocks(tables.problem))
     merge = partial(Merge, tables, useful, accuracy=accuracy, guarded=guarded)
-    if guarded or len(merge(ceiling=None).stages) > 2 or any(len(own) > 1 for own in useful):
-        rough = _complete(tables, useful, merge(ceiling=ceiling, most=ROUGH).run(deadline), guarded)
-        if len(rough.total):
-            ceiling = lowered(ceiling, rough.labels, rough.total)
+    plan = StageTimings(tables, useful)
+    if guarded or plan.is_coupled:
+        for most in ROUGH[: 2 if plan.is_long and not guarded else 1]:
+            run = merge(ceiling=ceiling, most=most).run(deadline)
+            rough = _complete(tables, useful, run, guarded)
+            if len(rough.total):
+                ceiling = lowered(ceiling, rough.labels, rough.total)
     finished = _complete(tables, useful, merge(ceiling=ceiling).run(deadline), guarded)
     if not len(finished.total):
         return finished

@@ -232,32 +232,22 @@ def _is_error(weak: Sequence[Column]) -> bool:
     return bool(weak) and weak[0].dtype == np.float64
 
 
-class _Stairs:
-    """Pairs of figures none of which is smaller in both: first rising, second falling."""
+_Steps = tuple[list[float], list[float], list[int]]  # first rising, second falling, row
 
-    def __init__(self) -> None:
-        self.first: list[float] = []
-        self.second: list[float] = []
-        self.row: list[int] = []
 
-    def lowest(self, one: float, two: float) -> int | None:
-        """A row that is no larger in either figure."""
-        place = bisect_right(self.first, one) - 1
-        return self.row[place] if place >= 0 and self.second[place] <= two else None
-
-    def add(self, one: float, two: float, row: int) -> None:
-        """Take in a row, and drop those that it makes superfluous."""
-        first, second = self.first, self.second
-        start = end = bisect_right(first, one)
-        if start and second[start - 1] <= two:
-            return
-        if start and first[start - 1] == one:
-            start -= 1
-        while end < len(first) and second[end] >= two:
-            end += 1
-        first[start:end] = [one]
-        second[start:end] = [two]
-        self.row[start:end] = [row]
+def _add(steps: _Steps, one: float, two: float, row: int) -> None:
+    """Take a row into pairs none of which is smaller in both, without those it replaces."""
+    first, second, rows = steps
+    start = end = bisect_right(first, one)
+    if start and second[start - 1] <= two:
+        return
+    if start and first[start - 1] == one:
+        start -= 1
+    while end < len(first) and second[end] >= two:
+        end += 1
+    first[start:end] = [one]
+    second[start:end] = [two]
+    rows[start:end] = [row]
 
 
 class _Sorted:
@@ -349,15 +339,19 @@ class _Sorted:
         amount = [0] * len(left) if self.given.amount_unknown else self.keys[0][left].tolist()
         if len(below) == 1:
             return left[_one_staircase(amount, first, second, ties, also)]
-        stairs = [_Stairs() for _ in below]
+        stairs: list[_Steps] = [([], [], []) for _ in below]
+        asked = [[stairs[g] for g in kinds] for kinds in below]
         kept = []
         deadline = in_force()
         for row, (one, two) in enumerate(zip(first, second, strict=True)):
             if row % ROWS_PER_LOOK == 0 and row:
                 deadline.check()
-            for g in below[group[row]]:
-                other = stairs[g].lowest(one, two)
-                if other is not None and (
+            for ones, twos, rows in asked[group[row]]:
+                place = bisect_right(ones, one) - 1
+                if place < 0 or twos[place] > two:
+                    continue
+                other = rows[place]
+                if (
                     amount[other] < amount[row]
                     or (first[other] < one and second[other] < two)
                     or (ties[other] < ties[row] and (also is None or also(other, row)))
@@ -365,7 +359,7 @@ class _Sorted:
                     break
             else:
                 kept.append(row)
-                stairs[group[row]].add(one, two, row)
+                _add(stairs[group[row]], one, two, row)
         return left[kept]
 
     def _lowest_before(self, column: Column, left: Indices) -> Indices:
