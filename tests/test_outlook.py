@@ -60,10 +60,10 @@ def test_looking_ahead_changes_no_front(vehicles: int, boards: bool) -> None:
 
 def test_what_is_stamped_badly_is_no_way_to_end_cheap_and_accurate() -> None:
     """One role to come: for 1 EUR and 16 ms, or for 200 EUR and 1 us; 10 m/s, 1 m either way."""
-    part = outlook.Part(
+    part = outlook.RoleOptions(
         np.array([1.0, 200.0]), np.ones(2), np.array([16e-3, 1e-6]), np.zeros(2, dtype=np.intp)
     )
-    way = outlook.Way((1, 0, 0.0, False), 0.0, np.zeros(1), (part,), 0, ())
+    way = outlook.Timed((1, 0, 0.0, False), 0.0, np.zeros(1), (part,), 0, ())
     made = outlook.Outlook([[way]], 10.0, 2.0)
     known = remaining.Ceiling(np.array([10.0, 110.0]), np.array([2.1, 2.05]))
 
@@ -81,8 +81,8 @@ def test_what_is_stamped_badly_is_no_way_to_end_cheap_and_accurate() -> None:
 
 def test_bands_have_every_bound_once() -> None:
     bounds = np.array([1e-6, 2e-6, 1e-3, 3e-3, 16e-3])
-    part = outlook.Part(np.ones(5), np.ones(5), bounds, np.zeros(5, dtype=np.intp))
-    way = outlook.Way((1, 0, 0.0, False), 0.0, np.array([5e-3]), (part,), 0, ())
+    part = outlook.RoleOptions(np.ones(5), np.ones(5), bounds, np.zeros(5, dtype=np.intp))
+    way = outlook.Timed((1, 0, 0.0, False), 0.0, np.array([5e-3]), (part,), 0, ())
     made = outlook.Outlook([[way]], 10.0, 1.0)
     for bound in (0.0, *bounds, 5e-3, 1.0):
         under = np.append(-np.inf, made.high[:-1])

@@ -17,7 +17,7 @@ from syncline_design.choice.arrays import Scaled, Tables, tie_order
 from syncline_design.choice.labels import NOT_MET, Addition, Labels, concatenate, extend, total_m
 from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline
-from syncline_design.choice.outlook import Key
+from syncline_design.choice.outlook import TimingKey
 from syncline_design.choice.pareto import Columns, Guard, undominated
 from syncline_design.choice.remaining import Ceiling, StageRoles, StillToCome, lowered
 from syncline_design.choice.safety import Safety, TimingClass
@@ -323,7 +323,7 @@ class Merge(StageTimings):
                 break
         return out
 
-    def _known_to(self, role: int, timing: TimingClass) -> tuple[Key | None, int] | None:
+    def _known_to(self, role: int, timing: TimingClass) -> tuple[TimingKey | None, int] | None:
         """Where in its stage the outlook looks on from; None where it does not."""
         stage = self.stages[self.number]
         if self.outlook is None:

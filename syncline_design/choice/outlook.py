@@ -29,11 +29,11 @@ NOTHING = np.zeros(0)
 CLOSED = Stairs(NOTHING, NOTHING)
 
 
-Key = tuple[int, int, float, bool]  # stage, clock, and tau and timeline of the reference
+TimingKey = tuple[int, int, float, bool]  # stage, clock, and tau and timeline of the reference
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class RoleOptions:
     """Options of one role as a way to time its stage has them: amounts, errors [m], bounds [s].
 
     needs: which shared hardware each takes channels of, a bit for each piece.
@@ -49,14 +49,14 @@ class Part:
         rows = self.bound <= bound_s * (1.0 + MARGIN)
         return stairs(self.amount[rows], self.error[rows], STEPS) if rows.any() else CLOSED
 
-    def on(self, hardware: int) -> Part:
+    def on(self, hardware: int) -> RoleOptions:
         """The options that need no other shared hardware."""
         rows = self.needs & ~hardware == 0
-        return Part(self.amount[rows], self.error[rows], self.bound[rows], self.needs[rows])
+        return RoleOptions(self.amount[rows], self.error[rows], self.bound[rows], self.needs[rows])
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class Timed:
     """A clock, and a timing of a stage's reference: what it takes, and the stage's roles in order.
 
     amount: of the clock, where it is chosen with this stage; chained: what bounds the reference may
@@ -64,14 +64,14 @@ class Way:
     of one unit of each piece, where the vehicle has this stage alone, else of none.
     """
 
-    key: Key
+    key: TimingKey
     amount: float
     chained: Floats
-    parts: tuple[Part, ...]
+    parts: tuple[RoleOptions, ...]
     needs: int
     prices: tuple[float, ...]
 
-    def equipped(self) -> Iterator[Way]:
+    def equipped(self) -> Iterator[Timed]:
         """The same with each set of shared hardware, its price added, and what needs no other."""
         for hardware in range(2 ** len(self.prices)):
             if self.needs & ~hardware == 0:
@@ -90,20 +90,20 @@ class Outlook:
     largest bound; least_m: the least error of all roles.
     """
 
-    def __init__(self, ways: Sequence[Sequence[Way]], rate_mps: float, least_m: float) -> None:
+    def __init__(self, ways: Sequence[Sequence[Timed]], rate_mps: float, least_m: float) -> None:
         self.rate = rate_mps
         self.low, self.high = _bands(ways, FINEST * least_m / rate_mps)
         self.under = np.append(-np.inf, self.high[:-1])
-        self.rest: dict[Key, list[ByBand]] = {}
+        self.rest: dict[TimingKey, list[ByBand]] = {}
         after = [(NO_ROLES,) * len(self.low)]
         for number in range(len(ways), 0, -1):
             after.insert(0, self._stage(ways[number - 1], after[0]))
         self.after = after
         self.grids: dict[int, Floats] = {}
-        self.tables: dict[tuple[int, Key | None, int], tuple[Floats, Floats]] = {}
+        self.tables: dict[tuple[int, TimingKey | None, int], tuple[Floats, Floats]] = {}
         self.ceiling: Ceiling | None = None
 
-    def _stage(self, ways: Sequence[Way], after: ByBand) -> ByBand:
+    def _stage(self, ways: Sequence[Timed], after: ByBand) -> ByBand:
         """What a stage and those after it take at least, by band."""
         self.rest.update((way.key, self._of_way(way)) for way in ways)
         each = [self.rest[way.key][0] for way in ways if not way.prices]
@@ -117,7 +117,7 @@ class Outlook:
             out.append(stairs(amount, error, STEPS).beside(later, STEPS) if open_to else CLOSED)
         return tuple(out)
 
-    def _of_way(self, way: Way) -> list[ByBand]:
+    def _of_way(self, way: Timed) -> list[ByBand]:
         """What the roles of a stage from each one on take at least, by band; nothing at the end."""
         closed = (way.chained.min() > self.high * (1.0 + MARGIN)).tolist()
         rest: list[ByBand] = [tuple(CLOSED if one else NO_ROLES for one in closed)]
@@ -132,7 +132,7 @@ class Outlook:
             rest[0] = tuple(Stairs(one.amount + way.amount, one.error) for one in rest[0])
         return rest
 
-    def _beside(self, part: Part, band: int, later: Stairs) -> Stairs:
+    def _beside(self, part: RoleOptions, band: int, later: Stairs) -> Stairs:
         if not len(later.amount):
             return CLOSED
         here = part.within(float(self.high[band]))
@@ -141,7 +141,7 @@ class Outlook:
         return here.beside(later, STEPS)
 
     def may_beat(
-        self, ceiling: Ceiling, number: int, key: Key | None, place: int,
+        self, ceiling: Ceiling, number: int, key: TimingKey | None, place: int,
         amount: Floats, error: Floats, bound: Floats,
     ) -> Bools:  # fmt: skip
         """Partial designs that may still end beside or below the known ones.
@@ -157,7 +157,7 @@ class Outlook:
         return out
 
     def _table(
-        self, ceiling: Ceiling, number: int, key: Key | None, place: int
+        self, ceiling: Ceiling, number: int, key: TimingKey | None, place: int
     ) -> tuple[Floats, Floats]:
         """Amounts, and by band what each leaves to err; between two amounts the smaller counts."""
         if ceiling is not self.ceiling:
@@ -208,7 +208,7 @@ def _just_past(amounts: Floats, less: float) -> Floats:
     return np.append(-np.inf, amounts + np.abs(amounts) * 4.0 * MARGIN - less)
 
 
-def _bands(ways: Sequence[Sequence[Way]], finest_s: float) -> tuple[Floats, Floats]:
+def _bands(ways: Sequence[Sequence[Timed]], finest_s: float) -> tuple[Floats, Floats]:
     """Least and largest bounds of bands [s]: bounds that occur, evenly by their logarithm."""
     found = [way.chained for stage in ways for way in stage]
     found += [part.bound for stage in ways for way in stage for part in way.parts]

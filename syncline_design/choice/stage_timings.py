@@ -10,7 +10,7 @@ import numpy as np
 from syncline_design.choice.arrays import RoleArrays, Tables
 from syncline_design.choice.labels import Addition
 from syncline_design.choice.options import Bools, Floats
-from syncline_design.choice.outlook import Outlook, Part, Way
+from syncline_design.choice.outlook import Outlook, RoleOptions, Timed
 from syncline_design.choice.remaining import StageRoles, stage_roles
 from syncline_design.choice.safety import TimingClass
 from syncline_design.choice.table import ClockOption
@@ -106,7 +106,7 @@ class StageTimings:
         least = math.fsum(float(role.error.min()) for role in self.tables.roles)
         return Outlook(ways, self.rate, least)
 
-    def timings(self, number: int) -> Iterator[Way]:
+    def timings(self, number: int) -> Iterator[Timed]:
         """The clocks and timings that a stage may have."""
         stage, scale = self.stages[number], self.tables.keys[0]
         items = [self.problem.infrastructure[i] for i in self.tables.tracked]
@@ -117,13 +117,13 @@ class StageTimings:
             taken = [name for name, _ in clock.requires]
             needs = sum(1 << k for k, item in enumerate(items) if item.id in taken)
             for timing in self.single_classes(stage):
-                yield Way(
+                yield Timed(
                     (number, place, timing.tau_s, timing.host), float(spent),
                     self._chained(number, timing), tuple(self._parts(stage, timing)),
                     needs, tuple(prices),
                 )  # fmt: skip
 
-    def _parts(self, stage: StageRoles, timing: TimingClass) -> Iterator[Part]:
+    def _parts(self, stage: StageRoles, timing: TimingClass) -> Iterator[RoleOptions]:
         """The roles of a stage in order, the options of the reference last."""
         for role in stage.leaves:
             added = self.leaf(role, stage, timing)
@@ -147,10 +147,10 @@ class StageTimings:
         return np.unique(np.concatenate(found))
 
 
-def _part(options: RoleArrays, bound: Floats | None) -> Part:
+def _part(options: RoleArrays, bound: Floats | None) -> RoleOptions:
     """Options as the outlook takes them."""
     needs = np.zeros(len(options), dtype=np.intp)
     for k, channels in enumerate(options.channels):
         needs |= np.where(channels > 0, 1 << k, 0)
     own = np.zeros(len(options)) if bound is None else bound
-    return Part(options.resources[0].astype(np.float64), options.error, own, needs)
+    return RoleOptions(options.resources[0].astype(np.float64), options.error, own, needs)
