@@ -40,7 +40,10 @@ def digest(*patterns: str) -> str:
     """Digest of the code that the answers depend on."""
     whole = hashlib.sha256()
     for pattern in patterns:
-        for file in sorted(ROOT.glob(pattern)):
+        files = sorted(ROOT.glob(pattern))
+        if not files:
+            raise FileNotFoundError(f"no code at {pattern}: answers would be kept over changes")
+        for file in files:
             whole.update(file.read_bytes())
     return whole.hexdigest()[:12]
 
@@ -48,7 +51,7 @@ def digest(*patterns: str) -> str:
 def digests() -> dict[str, str]:
     """Of what makes the logs, and of everything an answer and its score depend on."""
     logs = ("tests/world/*.py", "benchmarks/study_cases.py", "benchmarks/study_ideal.py")
-    rest = ("syncline_design/diagnose/*.py", "syncline_design/effects/*.py")
+    rest = ("syncline_design/diagnosis/*.py", "syncline_design/effects/*.py")
     return {
         "world": digest(*logs),
         "code": digest(*logs, *rest, "benchmarks/study_scoring.py"),
