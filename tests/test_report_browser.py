@@ -382,8 +382,8 @@ def test_what_a_bar_says_shows_under_the_pointer_and_by_keys(browser: Any, repor
             page.keyboard.press("ArrowRight")
             said.append(page.inner_text(tip))
         largest = max(syncline.ledger, key=lambda term: term.value_m)
-        assert sum(f"{1000 * largest.value_m:.4g}" in text.replace("\u00a0", " ")
-                   for text in said) == 1  # fmt: skip
+        in_limit_unit = f"{largest.value_m:.4g} m"  # the accuracy limit is written in metres
+        assert sum(in_limit_unit in text.replace("\u00a0", " ") for text in said) == 1
         page.keyboard.press("Escape")
         assert page.locator(tip).count() == 0
         box = drawing.bounding_box()

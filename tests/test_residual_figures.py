@@ -123,7 +123,7 @@ def test_the_caption_names_what_the_residuals_changed_with_and_every_figure_draw
         spectrum=Spectrum((0.1, 1.0), (1.0, 1.1), (2.0, 1.5)),
         normal=NormalPlot((-2.0, 0.0, 2.0), (-2.0, 0.0, 2.0)),
     )
-    assert [c.name for c in found] == ["residuals", "track", "against", "spectrum", "normal"]
+    assert [c.name for c in found] == ["residuals", "track", "spectrum", "against", "normal"]
     captions = {c.name: c.caption for c in found}
     assert "changes most with the speed" in captions["against"]
     assert "it is even" in captions["against"]
