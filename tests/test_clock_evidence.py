@@ -352,6 +352,8 @@ def _spoiled(folder: Path, name: str) -> list[Path]:
         rows = [[t, x + 37e6] for t, x in rows]
     elif name == "ns as us":
         rows = [[t, 1e3 * x] for t, x in rows]
+    elif name == "ns from the middle on":
+        rows = [[t, x * (1e3 if k > 150 else 1.0)] for k, (t, x) in enumerate(rows)]
     elif name == "stuck":
         rows = [[t, rows[0][1]] for t, _ in rows]
     elif name == "us as s":
@@ -367,6 +369,7 @@ DOUBTS = {
     "hour": "local time (DST)?",
     "TAI": "TAI against UTC (37 s)",
     "ns as us": "are the units the same?",
+    "ns from the middle on": "does another unit begin there?",
     "us as s": "is that the unit",
     "stuck": "the offset never changes",
 }
@@ -384,6 +387,22 @@ def test_logs_in_doubt_carry_no_claim_and_nothing_is_written(name: str, tmp_path
     assert found["entry"] is None
     assert not entry.exists()
     assert study_logs(_spoiled(tmp_path, "nothing"), TimingSettings()).timing.doubts == ()
+
+
+@pytest.mark.parametrize("what", ["step", "bad start", "settling"])
+def test_a_clock_that_is_a_thousand_times_worse_for_a_while_is_no_change_of_unit(
+    what: str, tmp_path: Path
+) -> None:
+    """The level moves without its scatter, or through all sizes between."""
+    rng = np.random.default_rng(4)
+    times, noise = START + 10.0 * np.arange(600), 1e-6 * rng.standard_normal(600)
+    later = np.arange(600) >= 300
+    if what == "bad start":
+        times = times + later * 86_400.0
+    extra = {"step": 1e-3 * later, "bad start": 1e-3 * later,
+             "settling": 1e-3 * np.exp(-np.arange(600) / 60.0)}[what]  # fmt: skip
+    log = write(tmp_path / "a.csv", made.csv_lines(times, 1e-6 + noise + extra))
+    assert study_logs([log], TimingSettings()).timing.doubts == ()
 
 
 def test_a_log_of_one_minute_is_no_session(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.clocks.series import ClockSeries
+from syncline_design.clocks.series import Array, ClockSeries
 from syncline_design.clocks.sessions import ClockSession, is_leap, went_back
 from syncline_design.clocks.times import moment, shown
 from syncline_design.model.figure_text import format_duration, to_digits
@@ -17,6 +17,7 @@ TAI_MINUS_UTC_S: Final = 37.0  # since 2017
 WHOLE_STEP_S: Final = 0.5
 _LARGEST_S, _SMALLEST_S = 0.5, 1e-11
 _THOUSANDS: Final = (1e3, 1e6, 1e9)
+_BLOCK, _FEWEST_BLOCKS = 10, 3  # samples of a block, blocks of either unit
 
 
 def doubts(series: Sequence[ClockSeries], sessions: Sequence[ClockSession]) -> tuple[str, ...]:
@@ -26,6 +27,7 @@ def doubts(series: Sequence[ClockSeries], sessions: Sequence[ClockSession]) -> t
         *(said for one in sessions for said in _steps(one)),
         *_levels(sessions),
         *_units(sessions),
+        *_unit_slip(sessions),
         *_own_bound(sessions),
         *_stuck(sessions),
     ]
@@ -105,6 +107,52 @@ def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
             yield (f"offsets in {large.series.files[0]} are {to_digits(ratio, 3)} times those in "
                    f"{small.series.files[0]}: are the units the same?")  # fmt: skip
             return
+
+
+def _unit_slip(sessions: Sequence[ClockSession]) -> Iterator[str]:
+    """Tables in which another unit begins under the same column name.
+
+    Level and scatter then grow by the same thousand at once.  A step or a bad start moves the
+    level alone; what decays passes through all sizes between.  Formats of daemons fix their unit.
+    """
+    tables = [s for s in sessions if s.is_counted and s.series.kind.family == "csv"]
+    for files, group in itertools.groupby(tables, key=lambda s: s.series.files):
+        blocks = np.concatenate([_blocks(s) for s in group])
+        level = np.median(np.abs(blocks[:, 1:]), axis=1)
+        scatter = np.median(np.abs(np.diff(blocks[:, 1:], axis=1)), axis=1)
+        split = _gap(level)
+        if split is None or not np.median(scatter[level <= split]) > 0.0:
+            continue
+        large, small = level > split, level <= split
+        ratio, of_scatter = (
+            float(np.median(size[large]) / np.median(size[small])) for size in (level, scatter)
+        )
+        if any(0.3 < ratio / t < 3.0 and 0.3 < of_scatter / t < 3.0 for t in _THOUSANDS):
+            first = int(np.flatnonzero(large != large[0])[0])
+            kind = tables[0].series.kind
+            yield (f"{kind.name}: in {files[0]} offsets and their scatter change by "
+                   f"{to_digits(ratio, 3)} times at about "
+                   f"{moment(float(blocks[first, 0]), kind.stamps)}: does another unit begin there?"
+                   )  # fmt: skip
+            return
+
+
+def _blocks(session: ClockSession) -> Array:
+    """Rows of a time and the `_BLOCK` offsets (s) from there on."""
+    whole = session.offsets.shape[0] // _BLOCK * _BLOCK
+    times = session.series.time_s[session.steady][:whole:_BLOCK]
+    return np.column_stack((times, session.offsets[:whole].reshape(-1, _BLOCK)))
+
+
+def _gap(level: Array) -> float | None:
+    """The lower edge of the widest empty factor between two groups of levels, if beyond 100."""
+    ordered = np.sort(level[level > 0.0])
+    if ordered.shape[0] < 2 * _FEWEST_BLOCKS:
+        return None
+    factors = ordered[1:] / ordered[:-1]
+    k = int(np.argmax(factors))
+    few = min(k + 1, ordered.shape[0] - k - 1) < _FEWEST_BLOCKS
+    return None if few or factors[k] <= 100.0 else float(ordered[k])
 
 
 def _own_bound(sessions: Sequence[ClockSession]) -> Iterator[str]:
