@@ -187,3 +187,11 @@ def test_the_residual_is_written_into_a_spec_on_request_and_marked(
     assert "upper bound from audit of gnss" in role["note"]
     assert CliRunner().invoke(app, ["check", str(out)]).exit_code == 0
     assert run(folder / "gnss.csv", "--write-spec", out).exit_code == 2
+
+
+def test_a_table_of_no_numbers_is_not_sound(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("stamp_s,receive_s\n" + "nan,nan\n" * 100, encoding="utf-8")
+    found = run(log)
+    assert found.exit_code == 2
+    assert "no message in it has a time" in found.stderr

@@ -23,6 +23,8 @@ _FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _MOST_MOMENTS: Final = 200_000
 _LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
 _REACH: Final = 0.6  # of a grain, by receipts
+_MOST_OF: Final = 0.9  # of what receipts of one grain lie apart
+_HALF: Final = 0.02  # how near to two messages a grain their number is
 _WIDEST: Final = 1.3  # of a tick: how far from an even rhythm stamps on ticks are
 _STRICT: Final = 0.97
 _DISORDER: Final = 0.02  # of all stamps: transport that changes their order
@@ -84,6 +86,11 @@ def _shown_by_receipts(series: Series, pace: Cadence, grain: int) -> bool:
     late = (series.receive - series.stamp)[pace.places].astype(np.float64)
     pieces = np.array_split(late, max(1, min(16, late.size // 40)))
     reach = [float(np.subtract(*np.percentile(piece, [97.0, 3.0]))) for piece in pieces]
+    stamp = series.stamp[pace.places]
+    heads = max(1, np.count_nonzero(np.diff(stamp)))
+    whole = 1.0 - heads / (stamp.size - 1)  # of a grain, by its first and last message, both whole
+    if whole >= 0.5 - _HALF and max(reach) > _MOST_OF * whole * grain:
+        return True
     return max(reach) > _REACH * grain
 
 
@@ -287,8 +294,8 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
         return None  # the rhythm itself, with messages left out
     if timer is None or timer > 1.5 * period or not 0.5 < uneven / timer < _WIDEST:
         return None
-    if _in_turn(when, period) and not _exactly(interval, timer):
-        return None  # publishers in turn, whose distance happens to be near some ticks
+    if _in_turn(when, period) and not (timer == FTDI_S and _exactly(interval, timer)):
+        return None  # publishers in turn, or a sensor that measures in turn, near some ticks
     return _packets(series, interval, timer, True, 1.0, pace)
 
 
@@ -314,6 +321,11 @@ def _beat(pace: Cadence, interval: Array) -> float | None:
         one = interval[counts == 1]
         if one.size < 0.5 * interval.size or abs(float(np.median(one)) / timer - 1.0) > 0.002:
             continue
+        two = interval[counts == 2]
+        if two.size and abs(float(np.median(two)) / (2.0 * timer) - 1.0) > 0.002:
+            continue  # ticks of a part of this one
+        if np.count_nonzero(counts == 0) > 0.5 * two.size:
+            return None  # stamps that came twice: no tick was left out
         known = timer == FTDI_S  # no sensor measures so often
         return timer if skips_evenly(counts) and (known or not _strictly(counts)) else None
     return None

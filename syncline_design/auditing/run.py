@@ -83,16 +83,29 @@ def _open(
             problems.append(error)
             refused.append(IncompleteFile(str(path), str(error), 0))
             continue
-        if not any(one.messages for one in streams):
-            refused.append(IncompleteFile(str(path), "no message in it", 0))
-            problems.append(_nothing(path))
+        lacks = _lacks(streams)
+        if lacks is not None:
+            refused.append(IncompleteFile(str(path), lacks, 0))
+            problems.append(refuse(path, lacks, expected="at least one message with a stamp"))
             continue
         opened.append(_Opened(path, recording.format, streams, recording.incomplete))
     return opened, tuple(refused), problems
 
 
-def _nothing(path: Path) -> BadInput:
-    return refuse(path, "no message in it", expected="at least one message with a stamp")
+def _lacks(streams: Sequence[Stream]) -> str | None:
+    """Why a file gives nothing to audit; None where any message has a time of either kind."""
+    if not any(one.messages for one in streams):
+        return "no message in it"
+    timed = any(_timed(one) for one in streams)
+    return None if timed else "no message in it has a time"
+
+
+def _timed(stream: Stream) -> bool:
+    """Whether any message has a time of any kind."""
+    if stream.stamps is None:
+        return False
+    kinds = (stream.stamps.primary_ns, stream.stamps.secondary_ns)
+    return any(one is not None and bool(np.any(one != UNSET)) for one in kinds)
 
 
 def _recordings(opened: Sequence[_Opened]) -> list[list[_Opened]]:

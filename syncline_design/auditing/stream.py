@@ -36,7 +36,13 @@ from syncline_design.auditing.result import (
 from syncline_design.auditing.series import NS, Array, Series, seconds, series_of, spread
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts
 from syncline_design.auditing.slips import without_slips
-from syncline_design.auditing.stream_epochs import as_declared, as_epochs, known_offset, with_epoch
+from syncline_design.auditing.stream_epochs import (
+    as_declared,
+    as_epochs,
+    epoch_behind_shifts,
+    known_offset,
+    with_epoch,
+)
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -120,6 +126,10 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     least = max(_coarse(raw), step_ns / NS, grain.size_s if grain is not None else 0.0)
     moved = without_shifts(slips.series, least_s=least)
     series = moved.series
+    again = None if unit else epoch_behind_shifts(epoch, series)
+    if again is not None and moved.faults:
+        found[:] = with_epoch([f for f in found if f is not epoch], as_declared(again, stream))
+        known = known_offset(again, series, False)
     pace = cadence(series)
     found = _with_jumps(found, [*slips.faults, *moved.faults], pace.period_s)
     _last(series, pace, stream, known, grain, found)

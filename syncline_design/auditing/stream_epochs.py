@@ -38,6 +38,18 @@ def with_epoch(found: list[StampFault], epoch: StampFault | None) -> list[StampF
     return [whole if f is wraps[0] else f for f in found]
 
 
+def epoch_behind_shifts(epoch: StampFault | None, series: Series) -> StampFault | None:
+    """The exact epoch that shows once steps and drifts are taken out, where they hid it.
+
+    A stamp of the right epoch is hardly ahead of its receipt, so that a step or a drift forward
+    takes the median of stamp minus receipt past the constant that it began with.
+    """
+    if epoch is not None and epoch.parameters["kind"] != "unknown":
+        return None
+    again = epoch_fault(series)
+    return again if again is not None and known_offset(again, series, False) is not None else None
+
+
 def as_epochs(
     slips: Shifts, series: Series, whole: StampFault | None
 ) -> tuple[Shifts, StampFault | None]:  # fmt: skip
