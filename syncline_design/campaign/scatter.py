@@ -11,7 +11,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 RUNS_KNOWN: Final = 17.0  # runs that the noise fitted counts for, against the scatter of runs
-MOST_LOG: Final = 690.0
+MOST_LOG: Final = 690.0  # exp of no more stays within a double (709), with room for a sum
 
 
 @dataclass(frozen=True, slots=True)
