@@ -74,6 +74,7 @@ def settle(
 ) -> Settled:
     """Let every class compete, then drop the weakest effect while chance does as well.
 
+    The last one that is left has to bear its own evidence like any other.
     threshold: log p that the best candidate of a clean log falls below at the stated rate, given
     the model without the effect.  standing: whether an effect stands up in noise of another kind.
     """
@@ -88,9 +89,7 @@ def settle(
         less = {label: refitted_without(data, model, label) for label in model.labels}
         evidence = {label: _evidence(data, model, label, one) for label, one in less.items()}
         weakest = max(evidence, key=lambda label: (evidence[label].log_p, label), default=None)
-        if weakest is None or len(model.labels) < 2:
-            break
-        if evidence[weakest].log_p <= threshold(less[weakest]):
+        if weakest is None or evidence[weakest].log_p <= threshold(less[weakest]):
             break
         model = less[weakest]
     model, own = _valued(data, model, states)

@@ -37,7 +37,9 @@ from syncline_design.diagnosis.noise import (
     precision,
     with_size,
 )
+from syncline_design.diagnosis.parts import STRETCHES
 from syncline_design.diagnosis.scores import log_p_of
+from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import elapsed
 from syncline_design.effects.record import Array, Effect
@@ -56,11 +58,12 @@ def freedom_of(effect: Effect) -> int:
 def log_chance(effect: Effect, gain: float, freedom: int) -> float:
     """log of the chance that noise alone saves `gain` [nat] in this one effect.
 
-    A step is charged for the places at which it was looked for.
+    A step is charged for the places at which it was looked for, what acts in a part of the log for
+    the stretches.
     """
-    located = any(p.located for p in effect.parameters)
-    charge = math.log(STEP_TIMES) if located else 0.0
-    return min(log_p_of(2.0 * gain, freedom) + charge, 0.0)
+    places = STEP_TIMES if any(p.located for p in effect.parameters) else 1
+    stretches = STRETCHES if span_of(effect) is not None else 1
+    return min(log_p_of(2.0 * gain, freedom) + math.log(places * stretches), 0.0)
 
 
 def with_effect(data: Data, model: Model, found: Signature, level: NoiseLevel) -> Model:
