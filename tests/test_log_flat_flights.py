@@ -201,3 +201,21 @@ def test_the_clock_of_week_seconds_is_the_specs_else_gps_and_said(
     said = "in UTC, as the spec says" if told == "utc" else "in GPS, as the spec says"
     assert any((said if told else ASSUMED_GPS) in note for note in notes)
     assert any("wander" in note for note in notes)
+
+
+@pytest.mark.parametrize("rates", ["about the vertical", "not filled in"])
+def test_a_level_trajectory_contradicts_no_rates(tmp_path: Path, rates: str) -> None:
+    """Roll and pitch of exactly 0, and rates of 0 beside the vertical one, or all of them."""
+    fixes = made.write_nmea(tmp_path / "gnss.log", FIXES)
+    reference = made.write_sbet(tmp_path / "ref.out", TRUTH)
+    whole = np.fromfile(reference, dtype="<f8").reshape(-1, 17)
+    whole[:, 7:9] = whole[:, 14:17] = 0.0
+    if rates == "about the vertical":
+        whole[:, 16] = np.gradient(np.unwrap(whole[:, 9]), whole[:, 0])
+    whole.tofile(reference)
+    result = found(tmp_path, fixes, reference)
+    assert "rate_columns" not in [check.code for check in result.checks]
+    value, sigma = latency(result)
+    assert abs(value - LATE_S) < 4.0 * sigma
+    said = any("rates are zero throughout" in note for note in result.log.notes)
+    assert said == (rates == "not filled in")

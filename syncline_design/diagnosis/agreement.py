@@ -33,6 +33,7 @@ LAGS_S = np.linspace(-1.0, 1.0, 41)
 LATE_S = 0.15  # by which a column may come late
 MOVES = 10.0  # times its own noise: a direction that moves less is nothing but that noise
 ERRORS = 4.0  # standard errors that a disagreement must have on top of the tolerance
+ALIGNED = 1e-3  # of all motion: less beside it is how axes lie, and how the local level turns
 LEAST_PART = 0.5  # of a clear motion of the pose that a column must show
 ARM_M = 1.0  # by which places may be off in a turn: a wrong lever arm
 SHIFT_S = 1.0  # by which stamps may step within a log
@@ -241,12 +242,15 @@ def _is_offset(spans: WindowRows, moved: Array, own: Array) -> bool:
 def _missing(moved: Array, own: Array, sigma: float) -> str:
     """Says in which direction the pose clearly moves while the column shows less than half of it.
 
-    The median decides what is clear, so that a jump of the pose is not taken for motion.
+    The median decides what is clear, so that a jump of the pose is not taken for motion.  What a
+    direction holds beside a far larger motion is no signal: a level vehicle's rates about the
+    other axes may well be zero.
     """
     right = np.linalg.svd(moved, full_matrices=False)[2]
     along = moved @ right.T
+    least = max(CLEAR * np.sqrt(2.0) * sigma, ALIGNED * _size(moved), 1e-9)
     for k in range(right.shape[0]):
-        if float(np.median(np.abs(along[:, k]))) <= max(CLEAR * np.sqrt(2.0) * sigma, 1e-9):
+        if float(np.median(np.abs(along[:, k]))) <= least:
             continue
         part = float(np.sum(along[:, k] * (own @ right[k]))) / float(np.sum(along[:, k] ** 2))
         if abs(part) < LEAST_PART:

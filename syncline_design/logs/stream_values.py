@@ -217,6 +217,11 @@ def _velocity(values: StreamValues, frame: Frame, body: Body, turn: Array | None
 
 
 def _rates(values: StreamValues, body: Body) -> None:
+    """Body rates in forward, right, down; figures that nobody filled in are none."""
+    if values.has(RATE) and values.has(ATTITUDE) and not np.any(values.vectors(RATE)):
+        for name in RATE:
+            del values.columns[name]
+        values.note("body rates are zero throughout: not filled in, told by attitudes instead")
     if values.has(RATE) and body == "flu":
         values.put(RATE, values.vectors(RATE) @ FLU_TO_FRD.T)
         values.note("body rates (forward, left, up) were made forward, right, down")
