@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from diagnosis_samples import LATENCY
-from syncline_design.diagnosis import diagnose
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.diagnosis.candidates import candidates, directed_parts, signatures
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import Data, data_of, fit
@@ -269,10 +269,19 @@ def test_an_effect_is_named_in_foreign_noise(tmp_path: Path) -> None:
     assert (verdict, named) == ("explained", [("latency", "position")])
 
 
+def test_what_slow_courses_sized_without_it_have_taken_up_is_named(tmp_path: Path) -> None:
+    """A hard iron at ten bounds, on circuits on which the heading comes and goes as slow noise."""
+    iron = hidden("heading_hard_iron", "attitude", sin_rad=-0.00097, cos_rad=0.00104)
+    log = make_log(scenario("fixed_wing_circuits", 1003, 150.0, 10.0), (iron,), WHITE)
+    verdict, named = verdict_of(foreign(log, "as a camera"), tmp_path)
+    assert (verdict, named) == ("explained", [("heading_hard_iron", "attitude")])
+
+
 def verdict_of(log: WorldLog, folder: Path) -> tuple[str, list[tuple[str, str]]]:
     spec = folder / "spec.yaml"
     spec.write_text(log.spec_yaml(), encoding="utf-8")
-    found = diagnose(spec, [log.to_csv(folder / "log.csv")])
+    log_csv = log.to_csv(folder / "log.csv")
+    found = diagnose(spec, [log_csv], DiagnosisSettings(unseen_block=False))
     return found.verdict, [(f.effect, f.sensor) for f in found.findings if f.kind == "cause"]
 
 

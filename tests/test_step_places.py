@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from syncline_design.diagnosis.candidates import candidates, directed_parts
-from syncline_design.diagnosis.charges import charge
+from syncline_design.diagnosis.charges import charge, place_nats
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import Data, Model, data_of, fit
 from syncline_design.diagnosis.scene import scene
@@ -83,9 +83,33 @@ def _plain(data: Data, model: Model, place: float) -> float:
 
 
 def test_a_step_pays_for_its_size_and_its_place(started: tuple[Data, Model]) -> None:
-    """Half of log N for the size, log n for the place: n rows, N components."""
+    """Half of log N for the size; log(n / w) for a place known to w of n rows, N components.
+
+    w by moving the step to every row in turn, each move weighed by the full covariance.
+    """
     data, model = started
     assert len(data.view) == ROWS
     assert len(data.axes) == AXES
-    size, place = 0.5 * math.log(ROWS * AXES), math.log(ROWS)
-    assert charge(data, model, model.acting[1].label, model).figures == pytest.approx(size + place)
+    label = model.acting[1].label
+    found = located(data, model)
+    step, none = found.acting[1], found.acting[:1]
+    since = data.view.log.time_s - data.view.log.time_s[0]
+
+    def cost(place: float) -> float:
+        there = replace(step, values={**step.values, "time_s": place})
+        off = data.error((*none, there)) - data.error((*none, step))
+        return 0.5 * float(np.sum(off * found.precision.solve(off[:, :, None])[:, :, 0]))
+
+    known_to = sum(math.exp(-cost(float(place))) for place in since)
+    assert 1.0 < known_to < 0.2 * ROWS
+    size, place = 0.5 * math.log(ROWS * AXES), math.log(ROWS / known_to)
+    figures = charge(data, found, label, found).figures
+    assert figures == pytest.approx(size + place, abs=0.5)
+
+
+def test_a_place_that_the_log_does_not_tell_costs_nothing(started: tuple[Data, Model]) -> None:
+    data, model = started
+    step = model.acting[1]
+    small = replace(step, values={**step.values, "step_s": 1e-9})
+    assert place_nats(data, replace(model, acting=(model.acting[0], small)), step.label) < 1e-3
+    assert place_nats(data, model, model.acting[0].label) == 0.0

@@ -2,19 +2,23 @@
 
 Its figures, each as half of log N (Schwarz 1978), of all subsets of them the cheapest, charged for
 having been chosen (Chen and Chen, Biometrika 95 (2008)): an arm of which only the height is seen
-has one figure, as has a height of the target.  The place from which a step acts is charged log n,
-as there is one at every row (Zhang and Siegmund, Biometrics 63 (2007)).  Less the noise that it
-borrows from the columns of motion, which is known up to its own chance.
+has one figure, as has a height of the target.  The place from which a step acts is one of n rows
+and known to w of them, which costs log(n / w) (Smith, Biometrika 62 (1975)): with C the noise and
+s_j what the step makes of row j, moving it over rows j costs the sum of s_j' C^-1 s_j / 2, and w is
+the sum over all rows k of exp(-what acting from there on costs).  Less the noise that it borrows
+from the columns of motion, which is known up to its own chance.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from syncline_design.diagnosis.borrowed import doubt_nats
+from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.identity import Label, effect_of
 from syncline_design.diagnosis.trials import freedom_of
@@ -64,7 +68,7 @@ def _figures(data: Data, model: Model, label: Label) -> float:
     each = 0.5 * math.log(max(len(data.view) * len(data.axes), 2))
     effect = effect_of(model, label)
     places = sum(p.located for p in effect.parameters)
-    whole = each * (freedom_of(effect) - places) + math.log(max(len(data.view), 2)) * places
+    whole = each * (freedom_of(effect) - places) + place_nats(data, model, label) * places
     values, covariance = _fitted(model, label)
     size, cheapest = len(values), whole
     for count in range(1, size):
@@ -73,6 +77,26 @@ def _figures(data: Data, model: Model, label: Label) -> float:
             paid = whole - each * len(left) + math.log(math.comb(size, count))
             cheapest = min(cheapest, paid + lost)
     return cheapest
+
+
+def place_nats(data: Data, model: Model, label: Label) -> float:
+    """What the place of a step costs [nat], log(n / w); nothing for what has none.
+
+    C is white: over the few rows that a place is known to, slow noise is a constant.
+    """
+    one = next((a for a in model.acting if a.label == label), None)
+    names = [] if one is None else [p.name for p in one.effect.parameters if p.located]
+    if one is None or not names:
+        return 0.0
+    always = replace(one, values={**one.values, names[0]: -math.inf})
+    values = np.array([float(one.values[p.name]) for p in one.effect.slopes()])
+    shape = np.nan_to_num(slopes(data.view, (always,))) @ values
+    lost = 0.5 * np.einsum("ni,nij,nj->n", shape, model.precision.white_inverse, shape)
+    since = data.view.log.time_s - data.view.log.time_s[0]
+    moved = np.concatenate([[0.0], np.cumsum(lost)])  # over all rows before each one
+    at = moved[np.searchsorted(since, float(one.values[names[0]]))]
+    known_to = float(np.sum(np.exp(-np.abs(moved[:-1] - at))))
+    return math.log(max(len(data.view) / max(known_to, 1.0), 1.0))
 
 
 def told_nats(model: Model, label: Label) -> float:

@@ -32,7 +32,7 @@ from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
 from syncline_design.diagnosis.pairs import promising, standing, with_pair
 from syncline_design.diagnosis.parts import NATS, STRETCHES, cut_down, in_a_part, refined
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
-from syncline_design.diagnosis.settling import Settled, borne_out, settle
+from syncline_design.diagnosis.settling import Settled, borne_out, settle, weaker_judged
 from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, slow_states
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.tails import tails_in
@@ -232,12 +232,32 @@ class Search:
         """
         moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
-        best = preferred(kept)
+        best = preferred(kept) or self.swallowed(model, scores, threshold)
         if best is None:
             both = [self.part_trial(model), self.pair_trial(model, scores, threshold)]
             found = min([t for t in both if t], key=lambda t: t.log_p, default=None)
             return found or self.wave_trial(model)
         return self.not_for_good(model, best)
+
+    def swallowed(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
+        """An effect that slow courses sized without it have taken up, if it stands once fitted.
+
+        By the likelihood it has to beat chance in noise that was fitted without it as well.  Not
+        beside a named one: if that is not the true one, others fit what it leaves.
+        """
+        if model.acting:
+            return None
+        wanted = beyond_chance(self.free_signatures(model), scores, threshold)[:TRIED]
+        trials = [self.trial(model, s, model.level) for s in wanted]
+        kept = [t for t in trials if t.log_p <= threshold and plausible(self.data, t.model)]
+        return preferred([t for t in kept if self.stands_fitted(t)])
+
+    def stands_fitted(self, trial: Trial) -> bool:
+        """Whether the effect of a trial stands beside slow courses that are sized with it."""
+        judged = weaker_judged(self.data, trial.model, self.states)
+        return all(
+            self.stands(one, a.effect) for a, one in judged if a.label == trial.candidate.label
+        )
 
     def not_for_good(self, model: Model, found: Trial) -> Trial:
         """A trial, or what goes back after a while in the place of a step that does not.
@@ -388,6 +408,18 @@ class Search:
                     model = trial.model
                     break
         return model
+
+
+def beyond_chance(free: Sequence[Signature], scores: Gram, threshold: float) -> list[Signature]:
+    """Signatures that gain more than chance would, the best of every candidate, best first."""
+    best: dict[Label, tuple[float, Signature]] = {}
+    for s, (gain, values) in zip(free, scores.gains(), strict=True):
+        effect, label = s.candidate.effect, s.candidate.label
+        if log_chance(effect, gain, freedom_of(effect)) > threshold or not possible(s, values):
+            continue
+        if label not in best or best[label][0] < gain:
+            best[label] = (gain, s)
+    return [s for _, s in sorted(best.values(), key=lambda one: -one[0])]
 
 
 def moved(model: Model, before: Model) -> list[Label]:

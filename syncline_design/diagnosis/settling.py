@@ -21,6 +21,7 @@ from syncline_design.diagnosis.step_form import refuted_steps
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance, seen_in_motion
 from syncline_design.diagnosis.wandering import Wandering
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -131,21 +132,10 @@ def _standing(
 ) -> Model:
     """The model without the effects that noise of another kind shows as well, weakest first.
 
-    What stands by the fitted noise has to stand by the spec's as well, larger where it is larger: a
-    sensor whose noise is fitted far too small lends its weight to whatever moves that sensor.
     Scatter of stamps that does not grow with the motion goes after them.
     """
     while model.acting:
-        stated = as_specified(data.structure)
-        larger = tuple(max(own, 1.0) for own in model.level.factor)
-        by_spec = replace(
-            model,
-            level=replace(
-                stated, factor=larger, size=model.level.size, episodes=model.level.episodes
-            ),
-        )
-        both = zip(model.acting, states.own(model), states.own(by_spec), strict=True)
-        judged = [(a, max(pair, key=lambda one: one.log_p)) for a, *pair in both]
+        judged = weaker_judged(data, model, states)
         fallen = [(one.log_p, a.label) for a, one in judged if not standing(one, a.effect)]
         if not fallen:
             break
@@ -155,6 +145,22 @@ def _standing(
         if one.candidate.label not in moving and not seen_in_motion(data, model, one):
             model = refitted_without(data, model, one.candidate.label)
     return model
+
+
+def weaker_judged(data: Data, model: Model, states: States) -> list[tuple[Acting, Judged]]:
+    """Every effect that moves the mean, with what less is said for it of two noises.
+
+    What stands by the fitted noise has to stand by the spec's as well, larger where it is larger: a
+    sensor whose noise is fitted far too small lends its weight to whatever moves that sensor.
+    """
+    stated = as_specified(data.structure)
+    larger = tuple(max(own, 1.0) for own in model.level.factor)
+    by_spec = replace(
+        model,
+        level=replace(stated, factor=larger, size=model.level.size, episodes=model.level.episodes),
+    )
+    both = zip(model.acting, states.own(model), states.own(by_spec), strict=True)
+    return [(a, max(pair, key=lambda one: one.log_p)) for a, *pair in both]
 
 
 def _decided(
