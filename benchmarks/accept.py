@@ -50,12 +50,14 @@ class Planted:
     of: Callable[[Vehicle], tuple[Fault, Truths]]
 
 
-def late(role: str, times: float = 1.0) -> Planted:
-    def of(one: Vehicle) -> tuple[Fault, Truths]:
-        size = 0.025 if role == A else times * FAR_M / one.v_max
-        return Fault(late_s={role: size}), {(role, "latency"): size}
+def late(role: str, slopes: str = "") -> Planted:
+    """slopes: the columns of motion that are as late, of one device."""
 
-    return Planted(f"{role} late", of)
+    def of(one: Vehicle) -> tuple[Fault, Truths]:
+        size = 0.025 if role == A else FAR_M / one.v_max
+        return Fault(late_s={role: size}, slopes_too=bool(slopes)), {(role, "latency"): size}
+
+    return Planted(f"{role} and its {slopes} late" if slopes else f"{role} late", of)
 
 
 def late_for_a_while(role: str) -> Planted:
@@ -110,7 +112,7 @@ FAULTS = (
     turned(A, (0.0, 0.0, 0.5)), turned(A, (0.0, 0.35, 0.0)), turned(R, (0.5, 0.0, 0.0)),
     loud(P, ("position",), 2.5), loud(A, ("roll", "pitch", "yaw"), 2.5), loud(A, ("yaw",), 3.0),
     loud(R, ("range",), 3.0), loud(R, ("bearing",), 2.5), loud(R, ("range", "bearing"), 2.5),
-    fast(1.9),
+    fast(1.9), late(P, "velocities"), late(A, "rates"),
 )  # fmt: skip
 
 

@@ -63,10 +63,12 @@ VEHICLES = {
 @dataclass(frozen=True)
 class Fault:
     """What is wrong: late by role (s, or a function of time), arms and turns off, noise as times
-    the figure by group (position, roll, pitch, yaw, range, bearing).
+    the figure by group (position, roll, pitch, yaw, range, bearing).  slopes_too: velocities are as
+    late as the position, rates as the attitude; else they come at their stamps.
     """
 
     late_s: dict[str, float | Callable[[Array], Array]] = field(default_factory=dict)
+    slopes_too: bool = False
     arm_m: dict[str, Vector] = field(default_factory=dict)
     turn_deg: dict[str, Vector] = field(default_factory=dict)
     times: dict[str, float] = field(default_factory=dict)
@@ -263,9 +265,12 @@ def _table(drive: Drive, one: Vehicle, fault: Fault) -> Array:
     bearing += np.radians(fault.turn_deg.get("ranging", (0.0, 0.0, 0.0))[:2])
     bearing += np.radians(noise((one.sigma_bearing,) * 2, ("bearing",) * 2))
     length = length + fault.longer_m + noise((one.sigma_range,), ("range",))[:, 0]
-    now, slope = angle(time_s), angle(time_s, 1)
+    turned_at, moved_at = (
+        at(role) if fault.slopes_too else time_s for role in ("attitude", "position")
+    )
+    now, slope = angle(turned_at), angle(turned_at, 1)
     rate = _body_rate(now, slope) + np.radians(0.02) * source.normal(size=now.shape)
-    speed = place(time_s, 1) + 0.005 * source.normal(size=now.shape)
+    speed = place(moved_at, 1) + 0.005 * source.normal(size=now.shape)
     euler[:, 2] = np.mod(euler[:, 2] + np.pi, 2 * np.pi) - np.pi
     columns = (time_s, position, np.degrees(euler), speed, np.degrees(rate), length,
                np.degrees(bearing), target, number)  # fmt: skip

@@ -384,6 +384,7 @@ def test_logs_in_doubt_carry_no_claim_and_nothing_is_written(name: str, tmp_path
     found = json.loads(done.stdout)
     assert any(DOUBTS[name] in one for one in found["doubts"]), found["doubts"]
     assert found["claim"]["made"] is False
+    assert found["statistical_bound_s"] is None
     assert found["entry"] is None
     assert not entry.exists()
     assert study_logs(_spoiled(tmp_path, "nothing"), TimingSettings()).timing.doubts == ()

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from syncline_design.clocks.reading import read_logs
+from syncline_design.clocks.series import Array
 from syncline_design.clocks.sessions import sessions_of
 from syncline_design.clocks.stability import mtie, tdev
 from syncline_design.spec.load import BadInput
@@ -170,6 +171,46 @@ def test_the_same_session_counts_once(tmp_path: Path) -> None:
     for twin in (a, again, part, packed, rotated):
         with pytest.raises(BadInput, match=r"the same (session as in|log as)"):
             read_logs([a, twin])
+
+
+@pytest.mark.parametrize(
+    "how", ["ms", "rounded", "nearly all lost", "whole seconds", "wrong unit", "turned"]
+)
+def test_another_export_of_a_session_is_that_session(how: str, tmp_path: Path) -> None:
+    """One clock has one offset at one moment: it does not matter how many digits a file keeps."""
+    rng = np.random.default_rng(7)
+    times = START + 10.0 * np.arange(300) + rng.uniform(0.0, 0.3, 300)
+    late = 3e-4 + 1e-5 * rng.standard_normal(300)
+    first = write(tmp_path / "a.csv", _table("us", times, late, 1e6, 3))
+    name, values, factor, digits = {
+        "ms": ("ms", late, 1e3, 6), "rounded": ("us", late, 1e6, 0),
+        "nearly all lost": ("ms", late, 1e3, 2), "whole seconds": ("ns", late, 1e9, 0),
+        "wrong unit": ("us", late, 1e9, 3), "turned": ("us", -late, 1e6, 3),
+    }[how]  # fmt: skip
+    stamps = np.round(times) if how == "whole seconds" else times
+    again = write(tmp_path / "b.csv", _table(name, stamps[100:], values[100:], factor, digits))
+    with pytest.raises(BadInput, match=r"the same session as in .* 200 rows of CSV"):
+        read_logs([first, again])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_clocks_compared_at_the_same_moments_are_not_one_session(seed: int, tmp_path: Path) -> None:
+    """Two clocks of one room: half of their noise, and the day's temperature, is one."""
+    rng = np.random.default_rng([seed, 3])
+    times = START + 10.0 * np.arange(300)
+    day = 2e-4 * np.sin(times / 1000.0)
+    common = 1e-5 * rng.standard_normal(300)
+    logs = [
+        write(tmp_path / f"{k}.csv",
+              _table("us", times, day + common + 1e-5 * rng.standard_normal(300), 1e6, 1))
+        for k in range(2)
+    ]  # fmt: skip
+    assert len(read_logs(logs).series) == 2
+
+
+def _table(unit: str, times: Array, late: Array, factor: float, digits: int) -> list[str]:
+    rows = zip(times, factor * late, strict=True)
+    return [f"time_s,offset_{unit}", *(f"{t:.3f},{x:.{digits}f}" for t, x in rows)]
 
 
 def test_lost_lock_gaps_steps_and_leap_seconds_are_events(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from syncline_design.clocks import chrony, columns, linuxptp, ntpd, pulses
 from syncline_design.clocks.files import LogFile, read_files, refused
+from syncline_design.clocks.repeats import demand_once
 from syncline_design.clocks.series import FARTHEST_S, ClockSeries, Row, Sheet, SourceKind, series_of
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead
@@ -58,7 +59,7 @@ def read_logs(paths: Sequence[Path]) -> ClockLogs:
         for sheet in read:
             sheets.setdefault((file.log, sheet.kind.name), []).append((file, sheet))
     series = [_joined(parts) for parts in sheets.values()]
-    _demand_once(series, {str(file.path): file for file in files})
+    demand_once(series)
     freed = [_free_running(one) for one in series]
     notes += [said for _, said in freed if said]
     hashes = tuple(FileRead(str(file.path), file.sha256) for file in files)
@@ -175,34 +176,6 @@ def _joined(parts: list[tuple[LogFile, Sheet]]) -> ClockSeries:
         parts = sorted(parts, key=lambda part: part[0].order)
     files = tuple(str(file.path) for file, _ in parts)
     return series_of(kind, files, [sheet for _, sheet in parts])
-
-
-def _demand_once(series: Sequence[ClockSeries], files: dict[str, LogFile]) -> None:
-    """Rows of one source in two logs are one session given twice, whole or in part.
-
-    Within a log a row that comes back is one too: a rotation and its copy.
-    """
-    hint = "a session counts once: give each once"
-    for index, one in enumerate(series):
-        rows = one.time_s + 1j * one.offset_s
-        most = max(2, len(one) // 20)
-        for other in series[:index]:
-            if other.kind.name != one.kind.name or _apart(one, other):
-                continue
-            twice = int(np.sum(np.isin(rows, other.time_s + 1j * other.offset_s)))
-            if twice > most:
-                raise refused(files[one.files[0]].path, f"the same session as in {other.files[0]}",
-                              found=f"{twice} rows of {one.kind.name} with the same stamp and "
-                              "offset", hint=hint)  # fmt: skip
-        if len(one.files) > 1 and len(one) - np.unique(rows).shape[0] > most:
-            raise refused(files[one.files[-1]].path, f"the same session as in {one.files[0]}",
-                          found="rows with the same stamp and offset", hint=hint)  # fmt: skip
-
-
-def _apart(one: ClockSeries, other: ClockSeries) -> bool:
-    """Whether no stamp of one can be a stamp of the other."""
-    return bool(np.min(one.time_s) > np.max(other.time_s)
-                or np.min(other.time_s) > np.max(one.time_s))  # fmt: skip
 
 
 def _free_running(one: ClockSeries) -> tuple[ClockSeries, str]:

@@ -129,10 +129,10 @@ class CatalogEntry(Record):
 class Timing(Record):
     """What logs of a clock show, and what may be claimed from them.
 
-    statistical_bound_s None: too few sessions for one; hard_bound_s None: the logs hold no
-    dispersions or delays.  bound_s: the larger of both (`use` says otherwise where the user did),
-    declared terms included; event_bound_s: with lost lock, steps and holdover.  doubts: what
-    forbids any claim until it is explained.
+    statistical_bound_s None: too few sessions for one, or logs in doubt; hard_bound_s None: the
+    logs hold no dispersions or delays.  bound_s: the larger of both (`use` says otherwise where the
+    user did), declared terms included; event_bound_s: with lost lock, steps and holdover.  doubts:
+    what forbids any claim until it is explained.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA

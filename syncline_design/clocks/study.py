@@ -93,7 +93,7 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     doubted = doubts(chosen.used, sessions)
     in_force().doing("bounding the clock's error")
     counted = [s for s in sessions if s.is_counted]
-    figures = _figures(counted, sessions, settings)
+    figures = _figures(counted, sessions, settings, claimable=not doubted)
     claim = _claim(counted, chosen, settings, figures, doubted)
     results = tuple(_session(s, settings.coverage) for s in sessions)
     timing = Timing(
@@ -131,16 +131,18 @@ class _Figures:
 
 
 def _figures(
-    counted: Sequence[ClockSession], sessions: Sequence[ClockSession], settings: TimingSettings
-) -> _Figures:
-    """The bounds.  With too few sessions for a statistical one, that of these sessions alone."""
+    counted: Sequence[ClockSession], sessions: Sequence[ClockSession], settings: TimingSettings, *,
+    claimable: bool,
+) -> _Figures:  # fmt: skip
+    """The bounds.  With too few sessions for a statistical one, that of these sessions alone; so of
+    logs in doubt, of which nothing can be claimed."""
     quantiles = np.array([s.quantile_s(settings.coverage) for s in counted])
     if not counted:
         return _Figures(quantiles, None, None, None, None, None)
     declared = math.fsum(settings.declared.values())
     statistical, method = None, None
     seen = float(np.max(quantiles)) + declared
-    if len(counted) >= LEAST_SESSIONS:
+    if claimable and len(counted) >= LEAST_SESSIONS:
         raised, method = tolerance_bound(quantiles, settings.session_share, settings.confidence)
         statistical = seen = raised + declared
     known = [s.hard_s for s in counted if not math.isnan(s.hard_s)]

@@ -155,7 +155,7 @@ def _chosen(
         spans = windows_of(time_s, length_s)
         if spans is None:
             break
-        moved = _motion(spans, place_m, rotation)
+        moved = moved_between(spans, place_m, rotation)
         size = float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
         if place_m is None and chosen is not None and size > MOST_TURN_RAD:
             break
@@ -165,7 +165,7 @@ def _chosen(
     return chosen
 
 
-def _motion(spans: WindowRows, place_m: Array | None, rotation: Array) -> Array:
+def moved_between(spans: WindowRows, place_m: Array | None, rotation: Array) -> Array:
     """Change of place [m], or sum of the turns [rad, body axes], over every window.
 
     The turns are summed step by step, as rates are: the turn between a window's ends is another

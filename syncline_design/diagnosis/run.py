@@ -68,6 +68,7 @@ from syncline_design.diagnosis.search import (
     silent,
     start_search,
 )
+from syncline_design.diagnosis.shared_stamps import with_shared_stamps
 from syncline_design.diagnosis.shown_noise import with_shown_noise
 from syncline_design.diagnosis.sight import informative, smallest_seen
 from syncline_design.diagnosis.survey import survey_m
@@ -170,12 +171,13 @@ def _examined(
     progress: SearchProgress,
 ) -> SearchedLog:
     """Look for what is missing in a log; positions that are off by whole seconds are put back."""
-    data, search, result = _searched(inputs, log, settings, progress)
+    told_apart = _with_shared_stamps(inputs, log)
+    data, search, result = _searched(inputs, told_apart, settings, progress)
     slip = _slip(result)
     if slip is not None and slip.effect.name not in settings.exclude_effects:
         before = usual_size(result.base.error)
         faults = (*faults, Gross(slip, before / max(usual_size(result.model.error), 1e-300)))
-        log = mended(log, slip, inputs.reread)
+        log = _with_shared_stamps(inputs, mended(log, slip, inputs.reread))
         data, search, result = _searched(inputs, log, settings, progress)
     return SearchedLog(inputs, faults, data, search, result)
 
@@ -327,6 +329,11 @@ def stand_ins(
         else replace(one, kind="stand_in")
         for one in named
     )
+
+
+def _with_shared_stamps(inputs: Measured, log: Log) -> Log:
+    """The log, with what it tells of whose stamps its columns of motion carry."""
+    return with_shared_stamps(log, scene(inputs.system, _in_windows(log), inputs.known))
 
 
 def _searched(

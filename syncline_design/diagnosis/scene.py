@@ -175,7 +175,8 @@ def _motion(log: Log, stage: StageLog) -> LoggedMotion:
         pieces(rate.time_s, rate.value),
         log.time_s,
         euler_to_rotation(stage.euler_rad),
-        stage.follows_position,
+        stage.follows_position or stage.velocity_of_position,
+        stage.rate_of_attitude,
     )
 
 
@@ -302,8 +303,9 @@ def _true_pose(view: Scene, index: int, departed: Departures) -> Array:
         rotation = euler_to_rotation(rows.euler_rad - departed.attitude_euler_rad)
     if np.any(departed.attitude_rotation_rad):
         rotation = rotation @ rotation_exp(-departed.attitude_rotation_rad)
-    measured_at = time_s + departed.attitude_shift_s
-    return view.motions[index].turned(rotation, measured_at, time_s + departed.ranging_shift_s)
+    late = departed.attitude_shift_s
+    ranged_at = time_s + departed.ranging_shift_s
+    return view.motions[index].turned(rotation, time_s + late, ranged_at, late)
 
 
 def _reference_point(
@@ -320,7 +322,7 @@ def _reference_point(
     if np.array_equal(own, ranged):
         return reading - rotate(pose, lever)
     motion = view.motions[index]
-    there = motion.turned(pose, ranged, own)
+    there = motion.turned(pose, ranged, own, departed.attitude_shift_s)
     return reading - rotate(there, lever) - motion.displacement(ranged, own, shift_s)
 
 

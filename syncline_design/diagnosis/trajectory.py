@@ -161,8 +161,8 @@ class LoggedMotion:
     """Motion of one stage: velocity [m/s] in NED and rate [rad/s] in the body, as functions.
 
     stamps_s, attitude (m,), (m, 3, 3): the logged poses, for shifts of many rows.
-    follows_position: the velocity was derived from the antenna's own positions, so it is late by
-    what the positions are late by.
+    follows_position, follows_attitude: the velocity carries the stamps of the positions, the rate
+    those of the attitudes, so that they are late by what these are late by.
     """
 
     time_s: Array
@@ -171,6 +171,7 @@ class LoggedMotion:
     stamps_s: Array
     attitude: Array
     follows_position: bool = False
+    follows_attitude: bool = False
     recent: Recent = field(default_factory=lambda: Recent(SHIFTS), repr=False, compare=False)
 
     def at(self, time_s: Array) -> LoggedMotion:
@@ -211,10 +212,12 @@ class LoggedMotion:
         second: Array = ((to_s - from_s) ** 2 / 12.0)[:, None] * np.cross(start, stop)
         return first + second
 
-    def turned(self, rotation: Array, from_s: Array, to_s: Array) -> Array:
+    def turned(self, rotation: Array, from_s: Array, to_s: Array, attitude_shift_s: Array) -> Array:
         """R(to) from R(from) (n, 3, 3)."""
         if np.array_equal(from_s, to_s):
             return rotation
+        if self.follows_attitude:
+            from_s, to_s = from_s - attitude_shift_s, to_s - attitude_shift_s
         if float(np.max(np.abs(to_s - from_s))) > FAR_S:
             return self._far(to_s)
         carried: Array = rotation @ self._carried(from_s, to_s)

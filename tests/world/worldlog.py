@@ -19,6 +19,7 @@ from tests.world.trajectory import Array
 
 DEGREE = np.pi / 180.0
 NED = ("north", "east", "down")
+Moments = tuple[Array, Array]  # at which velocities and rates were true
 DIGITS = {"_s": 4, "_m": 4, "_deg": 5, "_mps": 3, "_degps": 3, "_id": 0}
 
 
@@ -104,13 +105,17 @@ def _in_wgs84(columns: dict[str, Array], origin: tuple[float, float, float]) -> 
 
 
 def _columns(
-    run: Scenario, readings: tuple[Reading, ...], listed: Array, noise: Noise
+    run: Scenario,
+    readings: tuple[Reading, ...],
+    listed: Array,
+    noise: Noise,
+    moved_at: tuple[Moments, ...],
 ) -> dict[str, Array]:
     rng = np.random.default_rng([run.seed, 41])
     columns: dict[str, Array] = {"time_s": run.stamps_s}
-    for carrier, reading in zip(run.carriers, readings, strict=True):
+    for carrier, reading, at in zip(run.carriers, readings, moved_at, strict=True):
         prefix = f"{carrier.name}_" if len(run.carriers) > 1 else ""
-        columns |= {f"{prefix}{k}": v for k, v in _stage(run, carrier, reading, noise, rng).items()}
+        columns |= {f"{prefix}{k}": v for k, v in _stage(carrier, reading, noise, rng, at).items()}
     stem = "reference" if run.kind == "position" else "target"
     for axis, values in zip(NED, listed.T, strict=True):
         columns[f"{stem}_{axis}_m"] = values
@@ -120,7 +125,7 @@ def _columns(
 
 
 def _stage(
-    run: Scenario, carrier: Carrier, reading: Reading, noise: Noise, rng: np.random.Generator
+    carrier: Carrier, reading: Reading, noise: Noise, rng: np.random.Generator, moved_at: Moments
 ) -> dict[str, Array]:
     columns: dict[str, Array] = {}
     if reading.antenna_m is not None:
@@ -130,13 +135,13 @@ def _stage(
     columns["roll_deg"] = roll / DEGREE
     columns["pitch_deg"] = pitch / DEGREE
     columns["yaw_deg"] = np.angle(np.exp(1j * yaw)) / DEGREE
-    rows = run.stamps_s.size
-    velocity = carrier.path.velocity(run.stamps_s)
-    velocity = velocity + noise.velocity_mps * rng.standard_normal((rows, 3))
+    velocity_at, rate_at = moved_at
+    velocity = carrier.path.velocity(velocity_at)
+    velocity = velocity + noise.velocity_mps * rng.standard_normal(velocity.shape)
     for axis, values in zip(NED, velocity.T, strict=True):
         columns[f"velocity_{axis}_mps"] = values
-    rate = carrier.path.body_rate(run.stamps_s)
-    rate = rate + noise.rate_radps * rng.standard_normal((rows, 3))
+    rate = carrier.path.body_rate(rate_at)
+    rate = rate + noise.rate_radps * rng.standard_normal(rate.shape)
     for axis, values in zip("xyz", rate.T, strict=True):
         columns[f"rate_{axis}_degps"] = values / DEGREE
     if reading.polar is not None:
@@ -146,8 +151,17 @@ def _stage(
     return columns
 
 
-def make_log(run: Scenario, effects: Sequence[Hidden] = (), noise: Noise | None = None) -> WorldLog:
-    """Drive the run with the hidden effects in place and write down what the sensors say."""
+def make_log(
+    run: Scenario,
+    effects: Sequence[Hidden] = (),
+    noise: Noise | None = None,
+    *,
+    shared_stamps: bool = False,
+) -> WorldLog:
+    """Drive the run with the hidden effects in place and write down what the sensors say.
+
+    shared_stamps: velocities are as old as the places, rates as the attitudes; else both are true.
+    """
     noise = noise or Noise()
     faults = all_faults(run, tuple(effects))
     clean = read_all(run, faults)
@@ -159,7 +173,14 @@ def make_log(run: Scenario, effects: Sequence[Hidden] = (), noise: Noise | None 
     if run.kind == "position" and noise.reference_m > 0.0:
         rng = np.random.default_rng([run.seed, 43])
         listed = listed + noise.reference_m * rng.standard_normal(listed.shape)
-    columns = _columns(run, readings, listed, noise)
+    true = run.stamps_s
+    moved_at = tuple(
+        (true - one.age_of("position", true), true - one.age_of("attitude", true))
+        if shared_stamps
+        else (true, true)
+        for one in faults
+    )
+    columns = _columns(run, readings, listed, noise, moved_at)
     return WorldLog(run, tuple(effects), noise, readings, columns)
 
 

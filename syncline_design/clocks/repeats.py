@@ -1,0 +1,94 @@
+"""One session given twice: as it is, in part, or as another program exported it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from syncline_design.clocks.files import refused
+from syncline_design.clocks.series import Array, ClockSeries
+
+_HINT: Final = "a session counts once: give each once"
+_FEWEST: Final = 10  # rows whose offsets can be told to move alike
+_SAME_STAMP: Final = 0.05  # of the usual time between rows: what an export rounds off
+_ALIKE: Final = 0.99  # correlation of what two logs' offsets move from row to row
+_ROUNDED: Final = 0.95  # share of rows that differ by no more than the coarser log's rounding
+_FINEST_S: Final = 1e-15  # below it offsets differ by arithmetic alone
+
+
+def demand_once(series: Sequence[ClockSeries]) -> None:
+    """Rows of one source in two logs are one session given twice, whole or in part.
+
+    Within a log a row that comes back is one too: a rotation and its copy.
+    """
+    for index, one in enumerate(series):
+        rows = one.time_s + 1j * one.offset_s
+        most = max(2, len(one) // 20)
+        for other in series[:index]:
+            if other.kind.name != one.kind.name or _apart(one, other):
+                continue
+            exactly = int(np.sum(np.isin(rows, other.time_s + 1j * other.offset_s)))
+            twice = max(exactly, _followed(one, other))
+            if twice > most:
+                raise refused(Path(one.files[0]), f"the same session as in {other.files[0]}",
+                              found=f"{twice} rows of {one.kind.name} with the same stamps, whose "
+                              "offsets are the same but for unit or rounding",
+                              hint=_HINT)  # fmt: skip
+        if len(one.files) > 1 and len(one) - np.unique(rows).shape[0] > most:
+            raise refused(Path(one.files[-1]), f"the same session as in {one.files[0]}",
+                          found="rows with the same stamp and offset", hint=_HINT)  # fmt: skip
+
+
+def _apart(one: ClockSeries, other: ClockSeries) -> bool:
+    """Whether no stamp of one can be a stamp of the other."""
+    return bool(np.min(one.time_s) > np.max(other.time_s)
+                or np.min(other.time_s) > np.max(one.time_s))  # fmt: skip
+
+
+def _followed(one: ClockSeries, other: ClockSeries) -> int:
+    """How many rows of one log the other holds too, in another unit or rounded; 0: it does not.
+
+    Two clocks that are compared at the same moments do not move alike from row to row.  Stamps that
+    count from a start come back with the next one.
+    """
+    if one.kind.stamps != "utc":
+        return 0
+    own, others = _at_one_time(one, other)
+    if own.shape[0] < _FEWEST:
+        return 0
+    coarser = max(_resolution(own), _resolution(others))
+    near = np.abs(own - others) <= 0.51 * coarser + _FINEST_S
+    if float(np.mean(near)) > _ROUNDED:
+        return int(own.shape[0])
+    steps, others_steps = np.diff(own), np.diff(others)
+    size = float(np.linalg.norm(steps) * np.linalg.norm(others_steps))
+    alike = size > 0.0 and abs(float(steps @ others_steps)) > _ALIKE * size
+    return int(own.shape[0]) if alike else 0
+
+
+def _at_one_time(one: ClockSeries, other: ClockSeries) -> tuple[Array, Array]:
+    """Offsets [s] of both logs at the stamps that they share."""
+    order = np.argsort(other.time_s, kind="stable")
+    stamps = other.time_s[order]
+    near = np.clip(np.searchsorted(stamps, one.time_s), 1, max(stamps.shape[0] - 1, 1))
+    near = np.minimum(near, stamps.shape[0] - 1)
+    before = np.maximum(near - 1, 0)
+    near = np.where(
+        np.abs(stamps[before] - one.time_s) < np.abs(stamps[near] - one.time_s), before, near
+    )
+    steps = np.diff(np.unique(one.time_s))
+    least = _SAME_STAMP * float(np.median(steps)) if steps.shape[0] else 0.0
+    own, others = one.offset_s, other.offset_s[order][near]
+    shared = np.abs(stamps[near] - one.time_s) <= least
+    shared &= np.isfinite(own) & np.isfinite(others)
+    return own[shared], others[shared]
+
+
+def _resolution(offsets: Array) -> float:
+    """The smallest difference between two values [s]: what the last digit can say."""
+    steps = np.diff(np.unique(offsets))
+    steps = steps[steps > _FINEST_S]
+    return float(np.min(steps)) if steps.shape[0] else 0.0
