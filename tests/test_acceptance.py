@@ -209,10 +209,13 @@ def test_what_a_finding_may_be_instead_is_not_shown(found: Diagnosis) -> None:
 
 
 def seen_as(found: Diagnosis, short: Path, only: tuple[AssumptionName, ...] = NAMES,
-            instead: tuple[InItsPlace, ...] = ()) -> Acceptance:  # fmt: skip
+            instead: tuple[InItsPlace, ...] = (),
+            ends_s: tuple[float, float] | None = None) -> Acceptance:  # fmt: skip
     """What is said of a log whose diagnosis is this one."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(acceptance, "sighted", lambda *_: Sighted(found, instead=instead))
+        patched.setattr(
+            acceptance, "sighted", lambda *_: Sighted(found, instead=instead, ends_s=ends_s)
+        )
         return accept(load(EXAMPLE), [short], AcceptSettings(only), seed=0)
 
 
@@ -255,6 +258,22 @@ def test_of_what_a_log_cannot_tell_apart_one_is_broken_and_each_has_its_figure(
     assert "position" in group.look_first
     assert group.tell_apart is not None
     assert group.tell_apart.endswith("--separate 'latency(position)' 'lever_arm(position)'")
+
+
+@pytest.mark.parametrize(("to_s", "alone"), [(20.0, True), (29.9, False)])
+def test_an_arm_does_not_come_and_go(
+    to_s: float, alone: bool, found: Diagnosis, short: Path
+) -> None:
+    """A delay from 8 s to 20 s of 30 s is no arm; one that lasts to the end may be an arm moved."""
+    arm = rival("lever_arm", "position", 0.3, x_m=0.5, y_m=0.0, z_m=0.0)
+    told = aliased(found, arm)
+    (late,) = told.findings
+    told = replace(told, findings=(replace(late, from_s=8.0, to_s=to_s),))
+    either = seen_as(told, short, ends_s=(0.0, 30.0))
+    assert either.exit_code == 1
+    assert (rows_of(either)["position", "latency"].status == "broken") is alone
+    assert len(either.groups) == (0 if alone else 1)
+    assert rows_of(either)["position", "lever_arm"].status == "not_shown"
 
 
 def test_a_row_that_every_explanation_breaks_is_broken(found: Diagnosis, short: Path) -> None:

@@ -39,6 +39,7 @@ from syncline_design.diagnosis.result import (
     Finding,
     Smallest,
 )
+from syncline_design.diagnosis.stretches import is_inside
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.sentences import or_rivals
@@ -108,10 +109,22 @@ class LogEvidence:
         for each in known:
             if each.found == named:
                 ways.append(OneWay(tuple(of_joint(one, each.figures) for one in each.others)))
-        if len(ways) < 2 or any(e not in registry() for way in ways for e in way.effects):
+        if any(e not in registry() for way in ways for e in way.effects):
+            return None
+        if self._comes_and_goes(finding):
+            ways = [way for way in ways if all(registry()[e].passing for e in way.effects)]
+        if len(ways) < 2:
             return None
         slow = any(self._is_slow(part) for way in ways for part in way.parts)
         return InDoubt(finding.sentence, tuple(ways), finding.from_s, finding.to_s, finding, slow)
+
+    def _comes_and_goes(self, finding: Finding) -> bool:
+        """Whether it begins and ends within the log, as nothing does that is built in."""
+        ends_s = None if self.sight is None else self.sight.ends_s
+        if ends_s is None or finding.from_s is None or finding.to_s is None:
+            return False
+        inside = is_inside(finding.from_s, finding.to_s, ends_s)
+        return inside and registry()[finding.effect].passing
 
     def breaks(self, one: Assumed, part: Departing) -> bool:
         """Whether a departure would break this assumption, or make a delay that does."""

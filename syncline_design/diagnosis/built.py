@@ -39,6 +39,7 @@ class Sighted:
     taken: the stretches that the diagnosis is without.  factors: noise by `stage/sensor`.
     instead: what several departures together explain as well as one that was found.
     beyond: how far speed and turn rate are beyond their limits, by code and stage.
+    ends_s: stamps of the log's first and last row; None: not known.
     """
 
     found: Diagnosis
@@ -48,6 +49,7 @@ class Sighted:
     beyond: Mapping[tuple[str, str], Beyond] = field(default_factory=dict)
     taken: tuple[Stands, ...] = ()
     instead: tuple[InItsPlace, ...] = ()
+    ends_s: tuple[float, float] | None = None
 
 
 def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> Sighted:
@@ -78,6 +80,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             beyond,
             tuple(taken),
             in_place(one.data, model, one.search.signatures),
+            inputs.log.ends_s,
         )
 
 

@@ -248,15 +248,16 @@ def _named(data: Data, model: Model, asked: Sequence[Signature], hit: _Hit) -> S
     others = tuple(_told(data, other) for other in as_good if other is not named)
     return Stands(
         own.label, own.stage, hit.from_s, hit.to_s, own.parameters, own.values, own.spreads,
-        hit.log_p, hit.log_p < math.log(SURE), others, _is_inside(data, hit),
+        hit.log_p, hit.log_p < math.log(SURE), others,
+        is_inside(hit.from_s, hit.to_s, data.view.log.ends_s),
     )  # fmt: skip
 
 
-def _is_inside(data: Data, hit: _Hit) -> bool:
-    time_s = data.view.log.time_s
-    margin_s = EDGE * float(time_s[-1] - time_s[0])
-    first, last = float(time_s[0]), float(time_s[-1])
-    return hit.from_s - first > margin_s and last - hit.to_s > margin_s
+def is_inside(from_s: float, to_s: float, ends_s: tuple[float, float]) -> bool:
+    """Whether a stretch begins and ends within a log of these first and last stamps."""
+    first, last = ends_s
+    margin_s = EDGE * (last - first)
+    return from_s - first > margin_s and last - to_s > margin_s
 
 
 def _told(data: Data, fit: _Fit) -> OtherFit:

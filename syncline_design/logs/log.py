@@ -110,6 +110,11 @@ class Log:
         return usual_step_s(self.time_s)
 
     @property
+    def ends_s(self) -> tuple[float, float]:
+        """Stamps of the first and the last row [s]."""
+        return float(self.time_s[0]), float(self.time_s[-1])
+
+    @property
     def duration_s(self) -> float:
         """First to last row [s]."""
         return float(self.time_s[-1] - self.time_s[0])
