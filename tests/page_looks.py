@@ -11,9 +11,16 @@ FLAWS = """(width) => {
   const flaws = [], seen = e => e.checkVisibility();
   if (document.documentElement.scrollWidth > width) flaws.push('the page is wider than the window');
   document.querySelectorAll('.scroll, .inner').forEach(frame => {
-    if (!seen(frame) || frame.scrollWidth <= frame.clientWidth + 1) return;
-    const hint = getComputedStyle(frame, '::before').content;
-    if (!hint.includes('scroll')) flaws.push('cut without a hint: ' + frame.ariaLabel);
+    if (!seen(frame)) return;
+    [['::before', frame.scrollWidth > frame.clientWidth + 1],
+     ['::after', frame.scrollHeight > frame.clientHeight + 1]].forEach(([place, cut]) => {
+      const hint = getComputedStyle(frame, place).content;
+      if (cut && !hint.includes('scroll')) flaws.push('cut without a hint: ' + frame.ariaLabel);
+    });
+    frame.querySelectorAll('td, th').forEach(cell => {
+      const box = cell.getBoundingClientRect();
+      if (box.width < 90 && box.height > 190) flaws.push('squeezed: ' + cell.innerText);
+    });
   });
   document.querySelectorAll('figure svg').forEach(svg => {
     if (!seen(svg)) return;

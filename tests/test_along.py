@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import report_samples as samples
+from flown_specs import FAST, SLOW, TURN_S, flight, flown
 from html_page import Page
 from syncline_design.machine.records import read_as
 from syncline_design.model.system import Platform, Sensor, Stage, System
@@ -22,19 +22,6 @@ from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import check_loaded
 from tests.simulation_systems import fixed_wing
-
-SLOW, FAST, TURN_S, LASTS_S = 4.0, 16.0, 60.0, 120.0  # m/s up to the change at 60 s, and after it
-HEAD = "time_s,position_north_m,position_east_m,position_down_m,roll_deg,pitch_deg,yaw_deg"
-
-
-def flight(folder: Path) -> Path:
-    """North, slowly, then fast; the nose ahead, no turn."""
-    times = np.arange(0.0, LASTS_S + 0.1, 0.25)
-    north = np.where(times < TURN_S, SLOW * times, SLOW * TURN_S + FAST * (times - TURN_S))
-    rows = [f"{t},{n},0,-50,0,0,0" for t, n in zip(times, north, strict=True)]
-    path = folder / "flight.csv"
-    path.write_text("\n".join([HEAD, *rows]) + "\n", encoding="utf-8")
-    return path
 
 
 def asked(path: Path, samples: int = 2000) -> SimulationSettings:
@@ -92,22 +79,8 @@ def test_manoeuvres_and_free_motion_have_no_way_to_draw(tmp_path: Path) -> None:
     assert simulate(system, asked(flight(tmp_path), 500)).monte_carlo.along is not None
 
 
-@pytest.fixture
-def flown(tmp_path: Path) -> Path:
-    """A spec whose vehicle flies the file, timestamped so badly that speed decides."""
-    flight(tmp_path)
-    spec = tmp_path / "spec.yaml"
-    text = samples.PINNED.replace(
-        "monte_carlo: {samples: 2000}",
-        "monte_carlo: {samples: 2000, envelope: trajectory, trajectory: {file: flight.csv}}",
-    )
-    assert "flight.csv" in text
-    spec.write_text(text, encoding="utf-8")
-    return spec
-
-
-def test_a_page_draws_the_way_and_says_where_errors_are_largest(flown: Path) -> None:
-    case = load(flown)
+def test_a_page_draws_the_way_and_says_where_errors_are_largest(tmp_path: Path) -> None:
+    case = load(flown(tmp_path))
     plain = check_loaded(case, CheckSettings())
     assert plain.monte_carlo is not None
     assert plain.monte_carlo.along is None  # only where a figure was asked for

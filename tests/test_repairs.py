@@ -106,7 +106,7 @@ def test_a_lost_wire_costs_nothing_another_sensor_what_the_catalog_says() -> Non
         assert found[kind].verdict == "meets"
     assert [one.cheapest for one in found.values()].count(True) == 1
     assert "at no cost for parts" in _sentence(tuple(found.values()))
-    assert len(_row(found["sensor"])) == 5
+    assert len(_row(found["sensor"], None)) == 5
 
 
 def test_what_is_calibrated_out_leaves_its_interval() -> None:

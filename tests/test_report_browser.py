@@ -20,10 +20,13 @@ from checked import check_file
 from clock_logs import START, tracking
 from diagnosis_samples import diagnosis
 from family_specs import drawn, written
+from flown_specs import flown
 from study_specs import write
 from syncline_design.auditing.run import audit
+from syncline_design.campaign.joint import JointRequest, diagnose_joint
 from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.comparison.diff import diff
+from syncline_design.comparison.meaning import with_design
 from syncline_design.logs.inspection import inspect_logs
 from syncline_design.report.on_acceptance import on_acceptance
 from syncline_design.report.on_audit import on_audit
@@ -41,6 +44,8 @@ from syncline_design.studies import StudySettings, run_study
 from syncline_design.verdict.cloud import cloud
 from syncline_design.verdict.settings import CheckSettings, build_of
 from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.verify import check_loaded
+from tests.world import hidden, make_log, scenario
 
 pytestmark = pytest.mark.browser
 
@@ -318,6 +323,29 @@ def log_page(folder: Path) -> str:
     return html(on_log(inspect_logs([path])))
 
 
+def flight_page(folder: Path) -> str:
+    """The simulated error along the way that a vehicle flies."""
+    return html(on_verdict(check_loaded(load(flown(folder)), CheckSettings(cloud=True))))
+
+
+def joint_page(folder: Path) -> str:
+    """Three logs of one system: a delay of all of them, a bias that is another in each."""
+    late, bias = (
+        hidden("latency", "position", latency_s=0.05), hidden("range_bias", "ranging", bias_m=0.0)
+    )  # fmt: skip
+    paths = []
+    for k, size_m in enumerate((0.5, -0.4, 0.3)):
+        run = scenario("multirotor_lines", 70 + k, 30.0, 5.0)
+        log = make_log(run, (late, bias.with_values({"bias_m": size_m})))
+        paths.append(folder / f"log{k}.csv")
+        log.to_csv(paths[-1])
+    spec = folder / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    found = diagnose_joint(load(spec), JointRequest(tuple(paths)))
+    assert {one.scope for one in found.findings} == {"build", "log"}
+    return html(on_diagnosis(with_design(found, None)))
+
+
 def family_page(folder: Path) -> str:
     """Two missions with limits of their own, and every payload's front."""
     path = written(folder, *drawn(3))
@@ -332,6 +360,8 @@ KINDS: dict[str, Callable[[Path], str]] = {
     "paper": lambda _: html(on_paper(samples.reproduction())),
     "simulation": lambda _: html(samples.simulation()[0]),
     "diagnosis": lambda _: html(on_diagnosis(diagnosis())),
+    "joint": joint_page,
+    "flight": flight_page,
     "audit": audit_page,
     "timing": lambda folder: timing_page(folder),
     "acceptance": lambda folder: acceptance_page(folder),
@@ -390,6 +420,26 @@ def test_what_a_bar_says_shows_under_the_pointer_and_by_keys(browser: Any, repor
         assert box is not None
         page.mouse.move(box["x"] + 0.42 * box["width"], box["y"] + 0.88 * box["height"])
         assert "total" in page.inner_text(tip)
+
+
+def test_on_a_phone_what_is_bought_heads_its_card(browser: Any, report: Path) -> None:
+    """The item stands above its stage there, and beside it on a wide screen."""
+    verdict = samples.fixed_wing()
+    assert verdict.bill_of_materials is not None
+    items = [line.item for line in verdict.bill_of_materials]
+    with Opened(browser, report, viewport={"width": 420, "height": 900}) as opened:
+        page, rows = opened.page, "#bill .cards tbody tr"
+        told = """all => all.map(row => {
+            const top = e => e.getBoundingClientRect().top, head = row.querySelector('th');
+            const below = [...row.querySelectorAll('td:not(.void)')];
+            return [head.innerText, row.cells[0].innerText, below.every(d => top(d) > top(head))];
+        })"""
+        found = page.eval_on_selector_all(rows, told)
+        assert [head for head, _, _ in found] == [*items, "Total"]
+        assert all(headed for _, _, headed in found)
+        page.set_viewport_size({"width": 1300, "height": 900})
+        first = [name for _, name, _ in page.eval_on_selector_all(rows, told)]
+        assert first == [*(line.stage for line in verdict.bill_of_materials), "Total"]
 
 
 def test_figures_and_tables_can_be_taken_away(browser: Any, report: Path, tmp_path: Path) -> None:

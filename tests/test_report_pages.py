@@ -14,6 +14,7 @@ import report_samples as samples
 from diagnosis_samples import DESIGN, LATENCY, diagnosis
 from html_page import Page
 from syncline_design.comparison.meaning import DiagnosisAndDesign, ErrorFigure
+from syncline_design.comparison.repairs import Repair, RepairStep
 from syncline_design.diagnosis.findings import estimate, finding
 from syncline_design.diagnosis.result import MotionQuantiles, Rival, WholeGap
 from syncline_design.effects import registry
@@ -30,6 +31,7 @@ from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
 from syncline_design.report.text import visible
 from syncline_design.simulation import SimulationSettings, simulate
+from syncline_design.verdict.tree import decided
 from tests.simulation_systems import fixed_wing
 
 
@@ -51,6 +53,22 @@ def test_page_is_well_formed_and_fetches_nothing() -> None:
 
 def test_same_input_same_bytes() -> None:
     assert html(on_diagnosis(diagnosis())) == html(on_diagnosis(diagnosis()))
+
+
+def test_errors_beside_a_limit_stand_in_its_unit() -> None:
+    """An accuracy of `0.30 m` in the spec: no millimetres among what the design comes to."""
+    limit = decided(id="ACC-1", kind="accuracy", status="pass", value=0.117, limit=0.3, unit="m",
+                    limit_written="0.30 m")  # fmt: skip
+    step = RepairStep("nothing", "latency", "position", "car", "leave it", "")
+    left = Repair(0.0, "EUR", 0.0934, "meets", (), (step,), cheapest=True, beaten=False)
+    design = replace(DESIGN, before=replace(DESIGN.before, requirements=(limit,)))
+    told = console(on_diagnosis(diagnosis(design=design, repairs=(left,)))).replace("\u00a0", " ")
+    meant = told[told.index("The error without and with") :]
+    for text in ("0.117 m", "3.94 m", "0.1 m", "0.68 m", "0.6 m to 0.7 m", "0.0934 m"):
+        assert text in meant
+    assert " mm" not in meant
+    plain = console(on_diagnosis(diagnosis())).replace("\u00a0", " ")
+    assert "117 mm" in plain  # without a limit by the ladder
 
 
 def test_hostile_text_stays_text() -> None:

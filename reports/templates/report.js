@@ -41,8 +41,8 @@
     });
   });
 
-  // Tables that stand as cards on a phone stay tables for who listens to them.
-  document.querySelectorAll(".cards table").forEach(function (table) {
+  // Tables that stand as cards on a narrow screen stay tables for who listens to them.
+  document.querySelectorAll(".cards table, .wide table").forEach(function (table) {
     [["thead, tbody", "rowgroup"], ["tr", "row"], ["thead th", "columnheader"], ["tbody th", "rowheader"], ["td", "cell"]]
       .forEach(function (pair) {
         table.querySelectorAll(pair[0]).forEach(function (part) { part.setAttribute("role", pair[1]); });
@@ -57,6 +57,7 @@
     var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 60;
     if (phone.matches && few && cut(frame)) { frame.classList.add("cards"); }
     frame.classList.toggle("more", cut(frame));
+    frame.classList.toggle("down", frame.matches(".inner") && frame.scrollHeight > frame.clientHeight + 1);
   }
   var frames = Array.prototype.slice.call(document.querySelectorAll(".scroll, .inner"));
   if (window.ResizeObserver) {

@@ -224,14 +224,16 @@ def show(
 ) -> list[Node]:
     """A table as a node; none, or one without rows, as nothing.
 
-    A column in which no row says anything is left out, unless it names the rows.
+    A column in which no row says anything is left out, unless it is the first.
     """
     if table is None or not table.rows:
         return []
     kept = [i for i in range(len(table.heads)) if not i or any(row[i].text for row in table.rows)]
     heads = tuple(table.heads[i] for i in kept)
     rows = tuple(tuple(row[i] for i in kept) for row in table.rows)
-    return [TableNode(replace(table, heads=heads, rows=rows), silent, reach)]
+    named_by = kept.index(table.named_by) if table.named_by in kept else 0
+    shown = replace(table, heads=heads, rows=rows, named_by=named_by)
+    return [TableNode(shown, silent, reach)]
 
 
 def section(key: str, title: str, nodes: Iterable[Node], label: str = "",

@@ -169,7 +169,7 @@ def _table(result: Acceptance) -> Table:
         "Measured (95 %) #",
         "Evidence",
     )
-    return table("Assumptions", heads, rows)
+    return table("Assumptions", heads, rows, named_by=2)
 
 
 def _first_told(row: AssumptionResult) -> tuple[int, int]:

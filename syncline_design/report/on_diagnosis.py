@@ -49,6 +49,7 @@ from syncline_design.report.on_repairs import repair_nodes
 from syncline_design.report.on_residuals import residual_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
+from syncline_design.report.verdict_charts import tightest_limit
 
 DIAGNOSES: Final[dict[str, Outcome]] = {
     "agrees": Outcome(
@@ -425,21 +426,18 @@ def _design(design: DesignMeaning | None) -> list[Node]:
 
 
 def meaning_table(design: DesignMeaning) -> Table:
-    """The error without and with the findings, by model and simulated."""
+    """The error without and with the findings, by model and simulated, in the limit's unit."""
+    limit = tightest_limit(design.before, "accuracy")
     rows: list[tuple[Cell | str, ...]] = [
         (
             one.label,
-            *(Cell(numbers.length(value), value) for value in (one.before_m, one.after_m)),
-            _interval(one.after_interval_m),
+            *(Cell(numbers.error(value, limit), value) for value in (one.before_m, one.after_m)),
+            " to ".join(numbers.error(end, limit) for end in one.after_interval_m or ()),
         )
         for one in design.figures
     ]
     heads = ("Error of the design", "Without #", "With the findings #", "95 % interval, with")
     return table("The error without and with the findings", heads, rows)
-
-
-def _interval(ends: tuple[float | None, float | None] | None) -> str:
-    return " to ".join(numbers.length(end) for end in ends or ())
 
 
 def _log(found: Diagnosis) -> list[Node]:

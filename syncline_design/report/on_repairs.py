@@ -7,6 +7,7 @@ from syncline_design.comparison.repairs import Repair
 from syncline_design.report import numbers
 from syncline_design.report.document import Node, Text, show
 from syncline_design.report.table import Cell, table
+from syncline_design.report.verdict_charts import tightest_limit
 from syncline_design.report.words import BRIEF
 
 
@@ -16,7 +17,8 @@ def repair_nodes(found: DiagnosisAndDesign) -> list[Node]:
     if not rows:
         return []
     heads = ("Price #", "Error #", "Verdict", "What to do", "Provided that")
-    shown = table("Repairs", heads, [_row(one) for one in rows])
+    limit = None if found.design is None else tightest_limit(found.design.before, "accuracy")
+    shown = table("Repairs", heads, [_row(one, limit) for one in rows], named_by=3)
     return [Text(_sentence(rows)), *show(shown, silent=True)]
 
 
@@ -33,12 +35,12 @@ def _money(one: Repair) -> str:
     return numbers.money(one.price, one.currency)
 
 
-def _row(one: Repair) -> tuple[Cell | str, ...]:
+def _row(one: Repair, limit: numbers.Limited | None) -> tuple[Cell | str, ...]:
     word = BRIEF[one.verdict]
     missed = f": {', '.join(one.misses)}" if one.misses else ""
     return (
         Cell(_money(one), one.price),
-        Cell(numbers.length(one.error_m), one.error_m),
+        Cell(numbers.error(one.error_m, limit), one.error_m),
         Cell(word.word + missed, tone=word.tone, mark=word.mark),
         "; ".join(step.text for step in one.steps),
         "; ".join(dict.fromkeys(step.assumes for step in one.steps if step.assumes)),

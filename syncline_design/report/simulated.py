@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from syncline_design.simulation.results import Along, MonteCarlo, QuantileEstimate
 
 EVEN: Final = 1.1  # largest over smallest error along a trajectory up to which it is called even
+ALL: Final = 0.999  # share from which four figures no longer tell it from all
 BEYOND: Final = (
     "Samples exceed a sum of one-sigma terms often (39 % of them where position noise is all there "
     "is) and do not contradict the Syncline."
@@ -32,9 +33,12 @@ def simulation_facts(found: MonteCarlo) -> list[tuple[str, str]]:
         facts.append(("Distance simulated", end))
     within, worst = found.probability_within_target, found.worst_case
     if within is not None:
-        low, high = (numbers.percent(end, 5) for end in (within.low, within.high))
+        digits = 4 if within.high < ALL else 5
+        told, low, high = (
+            numbers.percent(share, digits) for share in (within.value, within.low, within.high)
+        )
         label = f"Within the limit of {numbers.limit(within)}"
-        facts.append((label, f"{numbers.percent(within.value, 5)} (95 %: {low} to {high})"))
+        facts.append((label, f"{told} (95 %: {low} to {high})"))
     ratio = numbers.percent(worst.ratio_to_syncline)
     return [
         *facts,
@@ -54,7 +58,7 @@ def ensemble(found: MonteCarlo) -> str:
 
 
 def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:].rstrip('.')}."
+    return numbers.micro(f"{text[0].upper()}{text[1:].rstrip('.')}.")
 
 
 def quantiles(found: MonteCarlo) -> Table:

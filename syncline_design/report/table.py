@@ -38,12 +38,17 @@ class Head:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A sortable table; the first cell of a row names the row."""
+    """A sortable table.
+
+    named_by: the column that names a row, and heads it where rows stand as cards; in a row that is
+    empty there, the first does.
+    """
 
     caption: str
     heads: tuple[Head, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
+    named_by: int = 0
 
 
 def table(
@@ -51,6 +56,7 @@ def table(
     heads: Iterable[str],
     rows: Iterable[Iterable[Cell | str]],
     note: str = "",
+    named_by: int = 0,
 ) -> Table:
     """A table; a heading that ends in ` #` is numeric, a plain string is a plain cell."""
     return Table(
@@ -58,4 +64,5 @@ def table(
         tuple(Head(h.removesuffix(" #"), h.endswith(" #")) for h in heads),
         tuple(tuple(c if isinstance(c, Cell) else Cell(c) for c in row) for row in rows),
         note,
+        named_by,
     )

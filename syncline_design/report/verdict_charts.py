@@ -14,6 +14,7 @@ from syncline_design.report.text import shortened
 from syncline_design.report.words import PRIMITIVES
 
 if TYPE_CHECKING:
+    from syncline_design.comparison.meaning import Summary
     from syncline_design.report.svg import InlineChart
     from syncline_design.verdict.named import CloudDesign
     from syncline_design.verdict.syncline_figures import SynclineFigures
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 # What draws is imported where it draws: ElementTree and matplotlib hide behind it.
 
 
-def tightest_limit(verdict: Verdict, kind: str) -> RequirementResult | None:
+def tightest_limit(verdict: Verdict | Summary, kind: str) -> RequirementResult | None:
     """The requirement with the tightest limit of a kind."""
     rows = (row for row in verdict.requirements if row.kind == kind)
     return min(rows, key=lambda row: row.limit, default=None)
@@ -198,7 +199,12 @@ def _cloud_words(
     which = "all designs" if every else f"{len(cloud)} designs drawn at random"
     broken = any(one.breaks for one in shown)
     crosses = "; a cross breaks a requirement other than accuracy" if broken else ""
-    return f" Dots: of {which}, the {len(shown)} that lie near the front{crosses}."
+    dearest = max(one.cost for one in shown) or 1.0
+    places = len({  # as far apart as the eye tells them: half a percent
+        (round(200.0 * one.cost / dearest), round(200.0 * math.log(one.error_m))) for one in shown
+    })  # fmt: skip
+    drawn = f", at {places} places" if 2 * places < len(shown) else ""
+    return f" Dots: of {which}, the {len(shown)} that lie near the front{drawn}{crosses}."
 
 
 def choice_chart(verdict: Verdict) -> list[Node]:

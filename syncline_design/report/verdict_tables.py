@@ -153,7 +153,7 @@ def bill(verdict: Verdict, lines: tuple[BillLine, ...]) -> Table:
     sums = (total(lines, name) for name in ("cost", "mass", "power"))
     rows.append(("Total", "", "", Cell("", None), *_amounts(verdict, *sums), ""))
     heads = ("Stage", "Item", "For", "Quantity #", "Cost #", "Mass #", "Power #", "Basis")
-    return table("Bill of materials", heads, rows)
+    return table("Bill of materials", heads, rows, named_by=1)
 
 
 def _amounts(
