@@ -168,6 +168,34 @@ def test_a_check_of_an_open_spec_with_its_page_loads_no_solver(tmp_path: Path) -
     assert (tmp_path / "page.html").stat().st_size > 10_000
 
 
+def test_other_designs_are_looked_for_where_they_are_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The text is the same to the letter, with what comes next or without."""
+    from typer.testing import CliRunner
+
+    from syncline_design.cli.app import app
+    from syncline_design.verdict import alternatives
+
+    def checked(*outputs: str) -> str:
+        words = ["check", str(SPECS / "uav_corridor.yaml"), *outputs]
+        done = CliRunner().invoke(app, words, catch_exceptions=False)
+        assert done.exit_code == 0
+        return done.stdout
+
+    data = tmp_path / "verdict.json"
+    told = checked("-o", f"json:{data}")
+    choice = json.loads(data.read_text(encoding="utf-8"))["choice"]
+    assert choice["next_best_every"]
+    assert choice["alternatives"]
+
+    def looked(*_: object) -> None:
+        raise AssertionError("looked for what nothing shows")
+
+    monkeypatch.setattr(alternatives, "alternatives", looked)
+    assert checked("-o", f"junit:{tmp_path / 'junit.xml'}") == told
+
+
 def test_an_interval_without_an_end_is_written_out(tmp_path: Path) -> None:
     """Few samples leave the upper end of a high quantile open: null in JSON, a word in text."""
     text = (ROOT / "specs" / "position_track.yaml").read_text(encoding="utf-8")

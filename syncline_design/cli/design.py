@@ -30,7 +30,7 @@ from syncline_design.cli.shared import (
     watched,
 )
 from syncline_design.machine.streams import say
-from syncline_design.report.formats import PICTURED
+from syncline_design.report.formats import NEXT_TO_TEXT, PICTURED
 
 if TYPE_CHECKING:
     from syncline_design.report.document import Document
@@ -76,7 +76,8 @@ def check(
     given = [] if baseline is None else [baseline]
     targets = output_targets(output, pictured(CHECK_FORMATS), [*found.files, *given])
     settings = CheckSettings(seed=seed, road=known_road(road), explain=tuple(explain or ()),
-                             cloud=any(t.format in PICTURED for t in targets))  # fmt: skip
+                             cloud=any(t.format in PICTURED for t in targets),
+                             others=any(t.format not in NEXT_TO_TEXT for t in targets))  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
         earlier = None if baseline is None else read_verdicts(baseline)
         verdicts = check_files(found.files, settings)

@@ -24,6 +24,8 @@ CATALOG_FORMATS: Final = ("json",)
 CHART_FORMATS: Final = ("svg", "png")  # of subjects with charts: a file each, into a folder
 PICTURED: Final = ("html", *CHART_FORMATS)  # what shows charts
 
+NEXT_TO_TEXT: Final = ("junit", "sarif", "github")  # tell no other designs than the chosen one
+
 # Pages and binary tables are for files; a bare format name does not send them to a terminal.
 NOT_FOR_A_TERMINAL: Final = ("html", "parquet")
 

@@ -17,6 +17,7 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.references import parts_in_use
 from syncline_design.verdict.design_data import full_design, named_design
 from syncline_design.verdict.named import (
+    Alternative,
     ChoiceResult,
     Exclusion,
     FactFigure,
@@ -42,11 +43,13 @@ def choice_of(
     points: Sequence[FrontPoint] | None = None,
     *,
     pictured: bool = False,
+    others: bool = True,
     brief: bool = False,
 ) -> ChoiceResult:
     """What was chosen among what; points: the front of cost, where it is known.
 
     pictured: whether to tell the front by a figure of the error too, where one is limited.
+    others: whether to look for the next best designs and for what else could be bought.
     brief: the front, and nothing besides.
     """
     # late: 20 ms that a pinned spec need not wait
@@ -60,15 +63,19 @@ def choice_of(
     pieces = pieces or Pieces()
     nothing: tuple[FrontPoint, ...] = ()
 
-    def others(every: bool) -> Iterator[Design]:
+    def next_best(every: bool) -> Iterator[Design]:
         return (d for d in best(problem, NEXT_BEST + 1, every=every) if d != chosen)
 
     if points is None:
         points = pieces.made("front", lambda: tuple(front(problem)), nothing)
     if brief:
         return ChoiceResult(picked.choice.proof, front_designs(case, problem, points))
-    following = pieces.listed("next best designs", lambda: others(every=False))
-    ranked = pieces.listed("next best of every design", lambda: others(every=True))
+    following = ranked = list[Design]()
+    offered = list[Alternative]()
+    if others:
+        following = pieces.listed("next best designs", lambda: next_best(every=False))
+        ranked = pieces.listed("next best of every design", lambda: next_best(every=True))
+        offered = pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))
     excluded, count = ruled_out(problem)
     by_figure = None
     if pictured:
@@ -87,7 +94,7 @@ def choice_of(
         ranked_designs(case, problem, ranked[:NEXT_BEST]),
         excluded,
         count,
-        tuple(pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))),
+        tuple(offered),
         tuple(bargains(case, problem, chosen, points)),
         by_figure=by_figure,
     )

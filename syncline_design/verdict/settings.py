@@ -22,6 +22,7 @@ class CheckSettings:
     explain: ids of requirements to work out step by step.
     cloud: whether designs around the front are told too, for a picture.
     today: the day on which waivers are judged; None: the machine's date.
+    others: whether the designs beside the chosen one are told, which texts do not show.
     brief: what decides, the design and its front alone: no other designs, no warnings, no sources.
     """
 
@@ -31,6 +32,7 @@ class CheckSettings:
     explain: tuple[str, ...] = ()
     today: date | None = None
     cloud: bool = False
+    others: bool = True
     brief: bool = False
 
 

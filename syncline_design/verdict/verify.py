@@ -118,8 +118,9 @@ def open_verdict(
         return infeasible_verdict(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
     choice = choice_of(
-        case, problem, picked, pieces, points, pictured=settings.cloud, brief=settings.brief
-    )
+        case, problem, picked, pieces, points,
+        pictured=settings.cloud, others=settings.others, brief=settings.brief,
+    )  # fmt: skip
     if settings.cloud:
         choice = replace(
             choice, cloud=tuple(pieces.listed("cloud", lambda: cloud(problem, choice.front or ())))
