@@ -11,8 +11,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from syncline_design.logs import sources
+from syncline_design.logs import parquet_source
 from syncline_design.logs.parquet_footer import chunks
+from syncline_design.logs.row_source import RowSource
+from syncline_design.logs.sources import opened
 from syncline_design.spec.load import BadInput
 
 PEAK = """
@@ -31,12 +33,12 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 
 @pytest.fixture
 def pieces_of_seven(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sources, "PIECE", 7)
+    monkeypatch.setattr(parquet_source, "PIECE", 7)
 
 
-def written(path: Path, **columns: list[object]) -> sources.RowSource:
+def written(path: Path, **columns: list[object]) -> RowSource:
     pl.DataFrame(columns).write_parquet(path)
-    return sources.opened(path)
+    return opened(path)
 
 
 def test_long_names_of_targets_take_little_memory(tmp_path: Path) -> None:
@@ -114,8 +116,9 @@ def test_text_that_unpacks_to_gigabytes_is_refused_unopened(
     cells = ["z" * 30_000 + str(k) for k in range(300)]
     pl.DataFrame({"target_id": cells}).write_parquet(path, compression="zstd")
     assert path.stat().st_size < 200_000
-    source = sources.opened(path)
-    monkeypatch.setattr(sources.ParquetSource, "_column", None)  # not a byte of it is unpacked
+    source = opened(path)
+    # not a byte of it is unpacked
+    monkeypatch.setattr(parquet_source.ParquetSource, "_column", None)
     with pytest.raises(BadInput, match="text too long; expected at most 200 characters a cell"):
         source.labels("target_id", np.ones(300, dtype=bool))
 
@@ -131,5 +134,5 @@ def test_sizes_in_the_footer_bound_the_text(tmp_path: Path, rows: int, compressi
     assert [values for values, _ in found] == [min(1000, rows - k) for k in range(0, rows, 1000)]
     for values, size in found:
         assert 150 * values <= size <= 2 * 160 * values + 2000
-    labels = sources.opened(path).labels("id", np.ones(rows, dtype=bool))
+    labels = opened(path).labels("id", np.ones(rows, dtype=bool))
     assert len(set(labels)) == rows

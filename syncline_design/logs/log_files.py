@@ -26,8 +26,9 @@ from syncline_design.logs.readers.reader import head_of
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer, Role, offers_of
+from syncline_design.logs.row_source import RowSource
 from syncline_design.logs.run_parts import one_run
-from syncline_design.logs.sources import RowSource, demand_plain_file, opened
+from syncline_design.logs.sources import demand_plain_file, opened
 from syncline_design.logs.static_arms import arm_notes, arms_beside
 from syncline_design.logs.stream_sources import sources_of
 from syncline_design.logs.surveys import Survey, first_survey

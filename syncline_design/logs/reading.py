@@ -31,7 +31,7 @@ from syncline_design.logs.magnitudes import demand_possible
 from syncline_design.logs.merging import merged
 from syncline_design.logs.pose_pairs import with_points
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.sources import RowSource
+from syncline_design.logs.row_source import RowSource
 from syncline_design.logs.tables import LogTable, read_tables
 from syncline_design.logs.twins import without_twins
 from syncline_design.machine.quick_dataclass import dataclass

@@ -33,7 +33,7 @@ from syncline_design.logs.one_frame import (
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer, Part, Role, parts_of
-from syncline_design.logs.sources import NANOSECONDS, Clock
+from syncline_design.logs.row_source import NANOSECONDS, Clock
 from syncline_design.logs.stream_times import UTC_CLOCK, on_one_timeline
 from syncline_design.logs.stream_values import (
     GLOBE,

@@ -19,7 +19,8 @@ from syncline_design.logs.columns import (
     si_columns,
 )
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.sources import RowSource, TextSource
+from syncline_design.logs.row_source import RowSource
+from syncline_design.logs.text_source import TextSource
 from syncline_design.machine.quick_dataclass import dataclass
 
 PLACES = (TARGET, tuple(f"target_{name}" for name in GEODETIC))

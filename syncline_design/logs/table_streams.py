@@ -18,7 +18,8 @@ from syncline_design.logs.readers.stream import (
     Stream,
 )
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.sources import NANOSECONDS, RowSource, opened
+from syncline_design.logs.row_source import NANOSECONDS, RowSource
+from syncline_design.logs.sources import opened
 from syncline_design.spec.load import BadInput
 
 

@@ -23,8 +23,9 @@ from syncline_design.logs.columns import (
 )
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_choice import Arranged, arranged, thinned
+from syncline_design.logs.row_source import NANOSECONDS, Clock, Mask, RowSource
 from syncline_design.logs.runs import demand_one_run
-from syncline_design.logs.sources import NANOSECONDS, Clock, Mask, RowSource, opened
+from syncline_design.logs.sources import opened
 from syncline_design.logs.surveys import Survey, has_places, is_survey, joined, survey_of
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_estimate

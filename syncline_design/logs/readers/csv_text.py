@@ -27,7 +27,8 @@ from syncline_design.logs.readers.reader import NO, FileHead, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Timeline
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.sources import TextSource, demand_plain_file
+from syncline_design.logs.sources import demand_plain_file
+from syncline_design.logs.text_source import TextSource
 
 if TYPE_CHECKING:
     import polars as pl

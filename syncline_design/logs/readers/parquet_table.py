@@ -10,12 +10,12 @@ import numpy as np
 
 from syncline_design.logs.cells import NO_TIME, BadCellError, trimmed
 from syncline_design.logs.delimited import RowBlock
+from syncline_design.logs.parquet_source import ParquetSource
 from syncline_design.logs.readers.csv_names import TimeColumn
 from syncline_design.logs.readers.csv_text import CsvRecording
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.sources import ParquetSource
 
 if TYPE_CHECKING:
     import polars as pl
