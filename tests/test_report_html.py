@@ -20,9 +20,11 @@ from html_page import Page
 from syncline_design.machine.records import Record
 from syncline_design.paper.errata import ERRATA
 from syncline_design.report import charts, errata
+from syncline_design.report.document import Document, Outcome, section, show
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
+from syncline_design.report.table import table
 from syncline_design.report.text import visible
 from syncline_design.simulation.results import ProportionEstimate
 from syncline_design.verdict.tree import FileProblem, Refused
@@ -112,7 +114,7 @@ def as_the_verdict_has_it() -> list[str]:
     up = math.ceil(1e5 * dearer.tightest_m) / 1e5, math.ceil(1e4 * cheaper.tightest_m) / 1e4
     return [
         f"{median.low_m:.4g}\u00a0m to {median.high_m:.4g}\u00a0m",
-        f"{100.0 * within.low:.5g}\u00a0%",
+        f"{100.0 * within.low:.4g}\u00a0%",
         f"{up[0]:.4g}\u00a0m to below {up[1]:.4g}\u00a0m",
         verdict.provenance.spec_sha256,
         verdict.warnings[0].message,
@@ -359,3 +361,20 @@ def test_syncline_figure_takes_extreme_systems(changes: dict[str, Any]) -> None:
     ElementTree.fromstring(drawn.svg)
     assert drawn.box is not None
     assert "nan" not in drawn.svg.lower().replace("nano", "")
+
+
+def test_tables_that_a_tablet_has_no_room_for_are_told() -> None:
+    """Six columns with a sentence, or eight of figures that do not break; not words that do."""
+    said = "a sentence that goes on for much longer than a column of a tablet is wide"
+    six = ("Status", "Where", "Assumption", "Assumed #", "Measured #", "Evidence")
+    row = ("holds", "car, position", "lever arm", "0 m", "0 m (-3.047 mm to 3.047 mm)", said)
+    eight = [str(k) for k in range(8)]
+    for one, wide in (
+        (table("x", six, [row]), True),
+        (table("x", [f"{head} #" for head in eight], [["65 000.00 EUR"] * 8]), True),
+        (table("x", ("A", "B", "C", "D"), [("x", said, "y", "1")]), False),
+        (table("x", eight, [eight]), False),
+    ):
+        part = section("part", "Part", show(one))
+        page = html(Document("x", Outcome("good", "x", "x"), "x", (), (), tuple(part)))
+        assert ('class="scroll cards wide' in page) is wide

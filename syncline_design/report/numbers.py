@@ -200,11 +200,11 @@ def nats(value: float, digits: int = 3) -> str:
     return typeset(figure_text.format_nats(value, digits))
 
 
-_GAP: Final = re.compile(r"(?<=\d) (?=\d{3}(?!\d)|nat\b)")
+_GAP: Final = re.compile(r"(?<=\d) (?=\d{3}(?!\d)|nat\b|%)")
 
 
 def unbroken(text: str) -> str:
-    """A text in which no line ends between groups of digits, or before nat."""
+    """A text in which no line ends between groups of digits, or before nat or %."""
     return _GAP.sub("\N{NO-BREAK SPACE}", text)
 
 

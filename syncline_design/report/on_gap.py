@@ -7,7 +7,6 @@ from functools import partial
 from typing import Final
 
 from syncline_design.diagnosis.plotted import (
-    Coverage,
     Plots,
 )
 from syncline_design.diagnosis.result import (
@@ -23,7 +22,6 @@ from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,
-    Group,
     Node,
     Text,
     show,
@@ -53,8 +51,6 @@ def gap_nodes(found: Diagnosis) -> list[Node]:
         "(NLL) and the coverage do."
     )
     tables = [*show(gap_table(found.gap)), *show(_steps(found.steps), reach="page")]
-    coverage = _coverage(found.plots.coverage)
-    fold = show(coverage, silent=True)
     placebo = _placebo_text(found.gap)
     unseen = _unseen_text(found.gap.unseen)
     return [
@@ -64,7 +60,6 @@ def gap_nodes(found: Diagnosis) -> list[Node]:
         *([Text(unseen)] if unseen else []),
         *([Text(placebo)] if placebo else []),
         *_coverage_chart(found.plots),
-        *([Group(tuple(fold), "fold", summary=coverage.caption, reach="page")] if coverage else []),
     ]
 
 
@@ -164,12 +159,3 @@ def _steps(steps: Sequence[Gap]) -> Table | None:
     rows = [(Cell(label), *_score_cells(scores)) for label, scores in gap_steps(steps)]
     heads = ("Step", *_SCORES)
     return table("Gap after each addition", heads, rows) if len(rows) > 2 else None
-
-
-def _coverage(found: Sequence[Coverage]) -> Table | None:
-    rows = [
-        tuple(Cell(numbers.percent(share), share) for share in (one.nominal, one.before, one.after))
-        for one in found
-    ]
-    caption = "Share of residuals inside the spec's own intervals"
-    return table(caption, ("Nominal #", "Before #", "After #"), rows) if rows else None

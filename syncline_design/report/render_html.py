@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _TEMPLATES: Final = "syncline_design.templates"
 MOST_VALUES: Final = 200  # rows of the table below a figure; more are shown one by one
+_LINE: Final = 30  # characters of a column that holds sentences
+_TABLET: Final = 100  # characters in a line of a table there
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 
 
@@ -87,6 +89,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["spans"] = spans
+    environment.tests["wide"] = _is_wide
     environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
     environment.filters["points"] = _points
@@ -121,6 +124,16 @@ def _values(figure: InlineChart, caption: str) -> Table | None:
 
 def _labels(figure: InlineChart) -> list[str]:
     return list(dict.fromkeys(label for t in figure.told for label in t.says))
+
+
+def _is_wide(shown: Table) -> bool:
+    """Whether a table needs more than a tablet has: words may break into lines, figures may not."""
+    needed = 0
+    for column, head in enumerate(shown.heads):
+        longest = max((len(row[column].text) for row in shown.rows), default=0)
+        longest = longest if head.numeric else min(longest, _LINE)
+        needed += 2 + max(longest, *(len(word) for word in head.text.split() or [""]))
+    return needed > _TABLET
 
 
 def _soft(text: str) -> str:
