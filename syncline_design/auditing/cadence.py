@@ -6,11 +6,13 @@ against the rhythm is the clock of the stamps, what does not is transport or the
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
+from syncline_design.auditing.coarse_rhythm import Counted
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, scatter, seconds, spread
 from syncline_design.logs.readers.stream import UNSET
@@ -153,16 +155,23 @@ def about_rhythm(when: Array) -> Array | None:
 
 
 def missing(
-    series: Series, pace: Cadence, level_s: float, *, blurred: bool = False
-) -> tuple[StampFault, ...]:
+    series: Series, pace: Cadence, level_s: float, *, blurred: bool = False,
+    count: Counted | None = None,
+) -> tuple[StampFault, ...]:  # fmt: skip
     """Gaps and single losses: stamps and receipts leave out what should have come.
 
     level_s: scatter of receipts minus stamps; an interval that only the stamps show is a step.
     blurred: stamps are too coarse, or scatter too much, to tell a late message from a lost one.
+    count: how the messages of coarse stamps were counted instead.
     """
     if pace.interval.size < _LEAST_INTERVALS or pace.period_s <= 0.0:
         return ()
-    lost = _lost(series, pace, level_s) if pace.regular else _holes(pace)
+    if count is not None:
+        pace = replace(pace, period_s=count.period_s, steps=count.lost + 1.0, regular=True)
+        level_s = max(level_s, count.tick_s)  # within a tick receipts and stamps differ anyhow
+        lost = _of_both(series, pace, _beside_unusable(count.lost, pace), level_s)
+    else:
+        lost = _lost(series, pace, level_s) if pace.regular else _holes(pace)
     if not lost.any():
         return ()
     few = lost[(lost > 0) & (lost < LONG_GAP)]
@@ -173,6 +182,8 @@ def missing(
         while pace.interval.size * share**run > 0.02 and run < 50:
             run += 1
         long_ = lost >= run
+    if count is not None:  # several may show at once
+        long_ &= pace.interval > 0.5 * lost * pace.period_s
     if long_.sum() > max(2.0, _MOST_GAPS * long_.size):
         return ()
     left_out = float(lost[~long_].sum()) + float(np.sum(at_another_rate(pace.steps)))
@@ -186,11 +197,7 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
     between = np.diff(pace.places) - 1.0
     lost = np.maximum(pace.steps - 1.0 - between, 0.0)
     lost[at_another_rate(pace.steps)] = 0.0
-    if series.receive is not None:
-        late = seconds(np.diff((series.receive - series.stamp)[pace.places]))
-        shifted = np.abs(late) > np.maximum(6.0 * level_s + 1e-6, 0.5 * lost * pace.period_s)
-        lost[shifted & (late < 0.0)] = 0.0
-        lost[_as_ever(series, pace, lost)] = 0.0
+    lost = _of_both(series, pace, lost, level_s)
     off = np.abs(pace.interval - pace.steps * pace.period_s)
     lost[off > np.maximum(_PLACED * pace.period_s, 0.02 * pace.interval)] = 0.0
     if pace.jitter_s > _UNEVEN * pace.period_s:
@@ -198,6 +205,23 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
             if not _stays(series, pace, int(k)):
                 lost[k] = 0.0
     return lost
+
+
+def _beside_unusable(lost: Array, pace: Cadence) -> Array:
+    """Missing messages without those taken out as unusable, which are counted a little later than
+    they are where several come in a tick."""
+    more = np.cumsum(lost) - np.cumsum(np.diff(pace.places) - 1.0)
+    return np.diff(np.maximum.accumulate(np.maximum(more, 0.0)), prepend=0.0)
+
+
+def _of_both(series: Series, pace: Cadence, lost: Array, level_s: float) -> Array:
+    """Those that receipts leave out as well as stamps."""
+    if series.receive is None:
+        return lost
+    late = seconds(np.diff((series.receive - series.stamp)[pace.places]))
+    shifted = np.abs(late) > np.maximum(6.0 * level_s + 1e-6, 0.5 * lost * pace.period_s)
+    lost = np.where(shifted & (late < 0.0), 0.0, lost)
+    return np.where(_as_ever(series, pace, lost), 0.0, lost)
 
 
 def _as_ever(series: Series, pace: Cadence, lost: Array) -> Mask:

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.cadence import Cadence, about_rhythm
+from syncline_design.auditing.coarse_rhythm import evenly
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -38,7 +39,7 @@ _BACK: Final = 0.35  # of a grain
 _NEXT: Final = 8  # messages on each side
 _MOST_LOST: Final = 0.15  # of all messages
 _COARSE_STEPS: Final = 3.0
-_EVENLY: Final = 0.25  # scatter of the distance between skips
+_OF_TWO: Final = 0.96  # of the intervals: one tick or two; among others messages may be lost
 _BUNCHED: Final = 0.25  # share of neighbours that come together
 _TOGETHER: Final = 0.1  # of the mean interval
 
@@ -127,7 +128,7 @@ def _alternates(series: Series, pace: Cadence, grain: int) -> bool:
     if usual == 1:  # of 0 and 2 grains beside 1: duplicates and losses, unless they come evenly
         slower = skips_evenly(counts) and not _lost(series, pace, counts, grain)
         slower = slower or _sawtooth(series, pace, counts, grain)
-        return slower or (grain <= _FINE and _evenly(np.flatnonzero(counts == 0)))
+        return slower or (grain <= _FINE and evenly(np.flatnonzero(counts == 0)))
     return int(np.sum(near & (counts % usual != 0))) >= 3
 
 
@@ -180,9 +181,9 @@ def _lost(series: Series, pace: Cadence, counts: Array, grain: int) -> bool:
 def skips_evenly(counts: Array) -> bool:
     """Whether single ticks are left out at even distances: a beat, and no lost messages."""
     skips = np.flatnonzero(counts == 2)
-    if skips.size < 6 or float(np.mean((counts == 1) | (counts == 2))) < 0.99:
+    if skips.size < 6 or float(np.mean((counts == 1) | (counts == 2))) < _OF_TWO:
         return False
-    return _evenly(skips)
+    return evenly(skips)
 
 
 def _strictly(counts: Array) -> bool:
@@ -193,14 +194,6 @@ def _strictly(counts: Array) -> bool:
     apart = np.diff(np.flatnonzero(counts == 2))
     values, often = np.unique(apart, return_counts=True)
     return bool(values.size and often.max() > _STRICT * apart.size)
-
-
-def _evenly(places: np.ndarray) -> bool:
-    """Whether places come at even distances, as a beat makes them."""
-    if places.size < 6:
-        return False
-    apart = np.diff(places)
-    return bool(spread(apart) <= max(1.0, _EVENLY * float(np.median(apart))))
 
 
 def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
@@ -283,7 +276,8 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
     if beat is not None:
         return _packets(series, interval, beat, True, 1.0, pace)
     if about is None:
-        return None
+        known = _of_ftdi(when, interval, neighbours)
+        return _packets(series, interval, FTDI_S, True, 1.0, pace) if known else None
     usual = float(np.median(interval[interval > 0.0]))
     period = float(interval[interval < 2.5 * usual].mean())
     uneven = float(np.percentile(about, 95) - np.percentile(about, 5))
@@ -297,6 +291,14 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
     if _in_turn(when, period) and not (timer == FTDI_S and _exactly(interval, timer)):
         return None  # publishers in turn, or a sensor that measures in turn, near some ticks
     return _packets(series, interval, timer, True, 1.0, pace)
+
+
+def _of_ftdi(when: Array, interval: Array, neighbours: Array) -> bool:
+    """Whether most intervals are one of two numbers of the known timer's ticks, be one far rarer:
+    no rhythm is seen about such stamps."""
+    low, high = np.percentile(neighbours, [5.0, 95.0])
+    alternate = abs(float(high - low) / FTDI_S - 1.0) < _TOGETHER
+    return alternate and best_timer(when) == FTDI_S and _exactly(interval, FTDI_S)
 
 
 def _in_turn(when: Array, period: float) -> bool:

@@ -13,18 +13,17 @@ from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import (
     Cadence,
     cadence,
-    counted_over_gaps,
     level_scatter,
     missing,
 )
 from syncline_design.auditing.clock_shapes import Shape
+from syncline_design.auditing.coarse_rhythm import counted_behind
 from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.disorder import Disorder, disorder_of
-from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
-from syncline_design.auditing.late_scatter import waits_of
 from syncline_design.auditing.levels import smallest
 from syncline_design.auditing.receipts import in_order_of_receipt, with_receipts_forward
+from syncline_design.auditing.residual import LATE_OR_COARSE, residual_of
 from syncline_design.auditing.result import (
     Consequence,
     EnvelopePoint,
@@ -33,7 +32,7 @@ from syncline_design.auditing.result import (
     SmallestSeen,
     StampFault,
 )
-from syncline_design.auditing.series import NS, Array, Series, seconds, series_of, spread
+from syncline_design.auditing.series import NS, Series, seconds, series_of
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts
 from syncline_design.auditing.slips import without_slips
 from syncline_design.auditing.stream_epochs import (
@@ -48,7 +47,6 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 
 RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
-LATE_OR_COARSE: Final = frozenset({"packetised", "truncated_stamps", "stamped_on_arrival"})
 _SAMPLE: Final = 100_000  # messages that tell a resolution
 _AT_EDGES: Final = 0.1  # of the messages that were overtaken
 _STRAY: Final = 0.01
@@ -56,8 +54,8 @@ _STRAY: Final = 0.01
 _OFF: Final = frozenset({"ahead_of_receipt", "epoch_offset", "whole_second_slip"})
 EDGE_S: Final = 1.5  # how near to the end of a shift a repeated stamp is its own
 TRACE_POINTS: Final = 240
+_COARSE: Final = 0.2  # of an interval: stamps of such grains are counted
 _UNEVEN: Final = 0.1  # of an interval
-_FLOOR: Final = 48  # messages, of which the fastest hardly waits
 _LARGE_STEP_NS: Final = 1e6
 
 
@@ -262,10 +260,13 @@ def _last(
 ) -> None:  # fmt: skip
     """What is looked for once everything else is taken out."""
     names = {fault.fault for fault in found}
-    if "packetised" not in names:
-        coarse = grain is not None and grain.size_s > 0.5 * pace.period_s
-        late = any(_blurs(f, pace) for f in found if f.fault == "stamped_on_arrival")
-        found += missing(series, pace, level_scatter(series), blurred=coarse or late)
+    packets = "packetised" in names
+    coarse = grain is not None and (packets or grain.size_s > _COARSE * pace.period_s)
+    count = counted_behind(series, names, grain.size_s) if grain is not None and coarse else None
+    late = any(_blurs(f, pace) for f in found if f.fault == "stamped_on_arrival")
+    blurred = late or (coarse and count is None)
+    shown = replace(pace, regular=False) if packets and count is None else pace  # holes alone
+    found += missing(series, shown, level_scatter(series), blurred=blurred, count=count)
     if not names & LATE_OR_COARSE:
         arrived = arrival.stamped_on_arrival(series, pace)
         found += [arrived] if arrived is not None else []
@@ -316,21 +317,6 @@ def _summed(
     )  # fmt: skip
 
 
-def residual_of(raw: Series, series: Series, faults: tuple[StampFault, ...]) -> ResidualTime:
-    """Receipt minus stamp above its envelope, of a series without its named faults."""
-    if series.receive is None or series.good.sum() < 2:
-        return ResidualTime(None, None, None)
-    drifts = any(f.fault == "drift" for f in faults)
-    whole = tuple(f for f in faults if f.fault != "stamped_on_arrival" or f.from_s is None)
-    restored = _restored(series, whole)
-    if restored is None:
-        return ResidualTime(None, None, None)
-    left = above_floor(series.seconds[series.places()], restored, sloping=drifts)
-    bound = float(left.max())
-    recorded = max(bound, float(np.ptp(_recorded(raw, series))))
-    return ResidualTime(bound, float(np.percentile(left, 95.0)), recorded)
-
-
 def without_clock_step(one: Examined, shift: Shift) -> Examined:
     """The stream with its receipts put back by a step of the recorder's clock."""
     series = one.series
@@ -356,60 +342,6 @@ def _offset(raw: Series) -> float | None:
     if raw.receive is None or not raw.good.any():
         return None
     return float(seconds(np.max((raw.stamp - raw.receive)[raw.good])))
-
-
-def _restored(series: Series, faults: tuple[StampFault, ...]) -> Array | None:
-    """Receipt minus stamp [s], stamps of a coarse or late clock put back to their sensor's rhythm.
-
-    None where stamps are arrivals and no rhythm says of what: how late they are is not known.
-    """
-    assert series.receive is not None
-    places = series.places()
-    whole = (series.receive - series.stamp)[places]
-    late = seconds(whole - whole.min())
-    names = {f.fault for f in faults}
-    if not names & LATE_OR_COARSE:
-        return late
-    when = seconds(series.stamp[places] - series.stamp[places[0]])
-    rhythm = _rhythm(when, cadence(series))
-    if rhythm is not None:
-        return np.asarray(late + when - rhythm)
-    return None if names & {"packetised", "stamped_on_arrival"} else late
-
-
-def _rhythm(when: Array, pace: Cadence) -> Array | None:
-    """When a regular sensor measured, from its own mean rhythm; None of an irregular one."""
-    if when.size < 40 or when[-1] <= 0.0:
-        return None
-    over = counted_over_gaps(when)
-    ways = [np.arange(when.size, dtype=np.float64) if over is None else over]
-    if pace.regular:  # with losses counted
-        ways.append(np.concatenate([[0.0], np.cumsum(pace.steps)]))
-    for counts in ways:
-        first, mean = np.polynomial.polynomial.polyfit(counts, when, 1)
-        even = np.asarray(first + mean * counts)
-        grain = float(np.percentile(np.diff(when), 99.0))
-        if float(np.ptp(when - even)) < 2.0 * grain + 2.0 * float(mean):
-            return even
-        if _keeps_to(when, even):
-            return even
-    return None
-
-
-def _keeps_to(when: Array, even: Array) -> bool:
-    """Whether messages that wait for longer than an interval keep to a line: their floor does."""
-    waits = waits_of(when)
-    if waits is None:
-        return False
-    away = (when - even)[: when.size // _FLOOR * _FLOOR].reshape(-1, _FLOOR)
-    return float(spread(away.min(axis=1))) < spread(waits.about_s)
-
-
-def _recorded(raw: Series, series: Series) -> Array:
-    """Receipt minus stamp as the file has them, of the messages in use [s]."""
-    assert raw.receive is not None
-    whole = (raw.receive - raw.stamp)[series.good]
-    return seconds(whole - whole.min())
 
 
 def _trace(raw: Series) -> tuple[EnvelopePoint, ...]:

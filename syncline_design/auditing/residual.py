@@ -1,0 +1,108 @@
+"""What is left of receipt minus stamp once every named fault is taken out."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from syncline_design.auditing.cadence import Cadence, cadence, counted_over_gaps
+from syncline_design.auditing.coarse_rhythm import counted_behind
+from syncline_design.auditing.envelope import above_floor
+from syncline_design.auditing.late_scatter import waits_of
+from syncline_design.auditing.result import FaultName, ResidualTime, StampFault
+from syncline_design.auditing.series import Array, Series, seconds, spread
+
+LATE_OR_COARSE: Final = frozenset({"packetised", "truncated_stamps", "stamped_on_arrival"})
+_FLOOR: Final = 48  # messages, of which the fastest hardly waits
+_WHOLE_TICK: Final = 2.5  # ticks: more is no count of what was measured
+
+
+def residual_of(raw: Series, series: Series, faults: tuple[StampFault, ...]) -> ResidualTime:
+    """Receipt minus stamp above its envelope, of a series without its named faults."""
+    if series.receive is None or series.good.sum() < 2:
+        return ResidualTime(None, None, None)
+    drifts = any(f.fault == "drift" for f in faults)
+    whole = tuple(f for f in faults if f.fault != "stamped_on_arrival" or f.from_s is None)
+    restored = _restored(series, whole)
+    if restored is None:
+        return ResidualTime(None, None, None)
+    left = above_floor(series.seconds[series.places()], restored, sloping=drifts)
+    bound = float(left.max())
+    recorded = max(bound, float(np.ptp(_recorded(raw, series))))
+    return ResidualTime(bound, float(np.percentile(left, 95.0)), recorded)
+
+
+def _restored(series: Series, faults: tuple[StampFault, ...]) -> Array | None:
+    """Receipt minus stamp [s], stamps of a coarse or late clock put back to their sensor's rhythm.
+
+    None where stamps are arrivals and no rhythm says of what: how late they are is not known.
+    """
+    assert series.receive is not None
+    places = series.places()
+    whole = (series.receive - series.stamp)[places]
+    late = seconds(whole - whole.min())
+    names = {f.fault for f in faults}
+    if not names & LATE_OR_COARSE:
+        return late
+    when = seconds(series.stamp[places] - series.stamp[places[0]])
+    tick_s = _tick_of(faults)
+    rhythm = _of_coarse(series, when, tick_s, names) if tick_s > 0.0 else None
+    if rhythm is None:
+        rhythm = _rhythm(when, cadence(series), tick_s)
+    if rhythm is not None:
+        return np.asarray(late + when - rhythm)
+    return None if names & {"packetised", "stamped_on_arrival"} else late
+
+
+def _tick_of(faults: tuple[StampFault, ...]) -> float:
+    """By how much packets or a grid make stamps late [s]; 0 of others."""
+    for fault in faults:
+        if fault.fault in ("packetised", "truncated_stamps"):
+            size = fault.parameters.get("interval_s") or fault.parameters["resolution_s"]
+            return float(size)
+    return 0.0
+
+
+def _of_coarse(series: Series, when: Array, tick_s: float, names: set[FaultName]) -> Array | None:
+    """When messages with stamps in packets, or on a grid, were measured, each counted."""
+    count = counted_behind(series, names, tick_s)
+    if count is None:
+        return None
+    waits = count.waits(when)
+    return np.asarray(when - waits) if float(np.ptp(waits)) < _WHOLE_TICK * tick_s else None
+
+
+def _rhythm(when: Array, pace: Cadence, tick_s: float) -> Array | None:
+    """When a regular sensor measured, from its own mean rhythm; None of an irregular one."""
+    if when.size < 40 or when[-1] <= 0.0:
+        return None
+    over = counted_over_gaps(when)
+    ways = [np.arange(when.size, dtype=np.float64) if over is None else over]
+    if pace.regular and 2.0 * tick_s < pace.period_s:  # with losses counted
+        ways.append(np.concatenate([[0.0], np.cumsum(pace.steps)]))
+    for counts in ways:
+        first, mean = np.polynomial.polynomial.polyfit(counts, when, 1)
+        even = np.asarray(first + mean * counts)
+        grain = float(np.percentile(np.diff(when), 99.0))
+        if float(np.ptp(when - even)) < 2.0 * grain + 2.0 * float(mean):
+            return even
+        if _keeps_to(when, even):
+            return even
+    return None
+
+
+def _keeps_to(when: Array, even: Array) -> bool:
+    """Whether messages that wait for longer than an interval keep to a line: their floor does."""
+    waits = waits_of(when)
+    if waits is None:
+        return False
+    away = (when - even)[: when.size // _FLOOR * _FLOOR].reshape(-1, _FLOOR)
+    return float(spread(away.min(axis=1))) < spread(waits.about_s)
+
+
+def _recorded(raw: Series, series: Series) -> Array:
+    """Receipt minus stamp as the file has them, of the messages in use [s]."""
+    assert raw.receive is not None
+    whole = (raw.receive - raw.stamp)[series.good]
+    return seconds(whole - whole.min())

@@ -1,0 +1,115 @@
+"""Losses and gaps beside packets and grids, each message's fate known to the maker."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from syncline_design.auditing.coarse_rhythm import counted
+from syncline_design.auditing.result import StampFault
+from syncline_design.auditing.stream import Examined, examined
+from syncline_design.logs.readers.stream import Stamps, Stream
+from syncline_design.machine.random_numbers import generator
+
+Array = NDArray[np.float64]
+EPOCH_NS = 1_779_000_000 * 10**9
+LENGTH_S, TICK_S, GRID_S = 75.0, 0.016, 0.1
+GAP_S = 5.3
+
+
+def measured(rate: float, gap: bool, share: float, seed: int) -> tuple[Array, int]:
+    """When the messages that came were measured [s], and how many single ones did not."""
+    rng = generator((seed, int(rate), int(gap), int(1e3 * share)))
+    count = int(LENGTH_S * rate)
+    when = (rng.uniform() + np.arange(count)) / rate * (1.0 + rng.normal(0.0, 2e-5))
+    lost = rng.uniform(size=count) < share
+    lost[:5] = lost[-5:] = False
+    hole = (when > 30.0) & (when < 30.0 + GAP_S) if gap else np.zeros(count, bool)
+    return when[~lost & ~hole], int(np.sum(lost & ~hole))
+
+
+def in_packets(when: Array, seed: int) -> tuple[Array, Array]:
+    """Stamps [s] of a serial chip that hands over what it has every 16 ms, and their receipts."""
+    rng = generator((seed, when.size))
+    tick = np.ceil(when / TICK_S)
+    first = np.concatenate([[True], np.diff(tick) > 0.0])
+    wait = rng.uniform(0.0, 2e-5, int(first.sum()))[np.cumsum(first) - 1]
+    stamp = tick * TICK_S + wait
+    return stamp, np.maximum.accumulate(stamp + rng.gamma(2.0, 1e-4, when.size) + 1e-3)
+
+
+def on_a_grid(when: Array, seed: int) -> tuple[Array, Array]:
+    """Stamps cut off to 100 ms, and receipts."""
+    rng = generator((seed, when.size))
+    late = rng.gamma(2.0, 1e-3, when.size) + 5e-3
+    return np.floor(when / GRID_S) * GRID_S, np.maximum.accumulate(when + late)
+
+
+def of(stamp: Array, receive: Array) -> Examined:
+    stamps = (EPOCH_NS + np.rint(x * 1e9).astype(np.int64) for x in (stamp, receive))
+    return examined(Stream("x", (), stamp.size, Stamps("header.stamp", "log time", *stamps)))
+
+
+def named(one: Examined) -> dict[str, StampFault]:
+    return {fault.fault: fault for fault in one.faults}
+
+
+MAKERS = {"packetised": in_packets, "truncated_stamps": on_a_grid}
+# no interval a simple part of the tick: where it is, waits that creep look like another interval
+CASES = [
+    ("packetised", 4.7), ("packetised", 23.0), ("packetised", 47.0), ("packetised", 119.0),
+    ("packetised", 187.0), ("truncated_stamps", 23.0), ("truncated_stamps", 101.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("gap", [False, True])
+@pytest.mark.parametrize(("fault", "rate"), CASES)
+def test_a_gap_beside_coarse_stamps_is_named_with_its_length(
+    fault: str, rate: float, gap: bool
+) -> None:
+    when, _ = measured(rate, gap, 0.0, 1)
+    stamp, receive = MAKERS[fault](when, 1)
+    found = named(one := of(stamp, receive))
+    assert set(found) == ({fault, "gap"} if gap else {fault})
+    if gap:
+        coarse = TICK_S if fault == "packetised" else GRID_S
+        hole = float(np.max(np.diff(when)))
+        assert abs(float(found["gap"].parameters["interval_s"]) - hole) <= coarse
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
+
+
+@pytest.mark.parametrize("gap", [False, True])
+@pytest.mark.parametrize(("fault", "rate"), CASES)
+def test_lost_messages_beside_coarse_stamps_are_counted(fault: str, rate: float, gap: bool) -> None:
+    """All of them where an interval is longer than a tick; about as many where waits creep."""
+    when, lost = measured(rate, gap, 0.01, 2)
+    found = named(of(*MAKERS[fault](when, 2)))
+    assert set(found) == {fault, "lost_messages"} | ({"gap"} if gap else set())
+    count = float(found["lost_messages"].parameters["count"])
+    creeping = fault == "packetised" and rate > 50.0
+    assert abs(count - lost) <= max(1.0, (0.15 if creeping else 0.05) * lost)
+
+
+@pytest.mark.parametrize("rate", [62.0, 62.4, 61.0, 124.0])
+def test_a_beat_between_interval_and_tick_is_no_loss(rate: float) -> None:
+    """62 Hz in ticks of 16 ms leave one out every 125, and no message is missing."""
+    when, _ = measured(rate, False, 0.0, 3)
+    assert "lost_messages" not in named(of(*in_packets(when, 3)))
+
+
+@pytest.mark.parametrize("rate", [4.0, 62.0, 130.0, 377.0])
+def test_every_message_is_numbered_as_it_was_measured(rate: float) -> None:
+    """Against the numbers that the maker gave, waits up to a tick whatever the interval."""
+    rng = generator((4, int(rate)))
+    number = np.arange(int(LENGTH_S * rate), dtype=np.float64)
+    number = number[(number < 20.0 * rate) | (number > 23.0 * rate)]
+    count = counted(number / rate + rng.uniform(0.0, TICK_S, number.size), TICK_S)
+    assert count is not None
+    assert count.period_s == pytest.approx(1.0 / rate, rel=1e-4)
+    assert count.number[-1] - count.number[0] == number[-1] - number[0]
+
+
+def test_what_has_no_rhythm_is_not_counted() -> None:
+    rng = generator((5,))
+    assert counted(np.sort(rng.uniform(0.0, LENGTH_S, 1500)), TICK_S) is None
