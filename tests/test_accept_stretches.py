@@ -6,6 +6,7 @@ truth is what it was told to do, and what cannot be seen follows from its own fi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -29,6 +30,7 @@ from syncline_design.diagnosis.noise import first_guess
 from syncline_design.diagnosis.noise_split import factors
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import prepared
+from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.stretches import Stretches, stretches
 from syncline_design.diagnosis.system import measured
 from syncline_design.diagnosis.undone import BUILD, left_open
@@ -301,6 +303,26 @@ def test_speed_beyond_the_limit_for_a_while_is_broken(tmp_path: Path) -> None:
     assert found.least > 1.01 * limit
     assert found.low <= float(np.max(speed)) * 1.001
     assert 0.0 < found.share(1.01 * limit) <= float(np.mean(speed > limit)) + 0.05
+
+
+@pytest.mark.parametrize("peak_s", [30.0, 30.7, 31.0, 31.4])
+def test_the_largest_mean_of_a_speed_begins_at_any_stamp(peak_s: float) -> None:
+    """8 m/s and a peak of 3 exp(-(t / 1 s)^2) more: 8 + 3 sqrt(pi)/2 (erf(1) - erf(-1)) / 2 m/s.
+
+    Of windows side by side none need hold the peak: one that two of them share is 0.9 m/s less.
+    """
+    time_s = np.arange(0.0, 60.0, 0.1)
+    speed = 8.0 + 3.0 * np.exp(-((time_s - peak_s) ** 2))
+    motion = np.stack([speed, 0.0 * speed, 0.0 * speed], axis=1)
+    logged = SimpleNamespace(velocity_mps=motion, rate_radps=motion)
+    platform = SimpleNamespace(v_max_mps=9.0, omega_max_radps=9.0)
+    stage = SimpleNamespace(name="van", platform=platform, position=None, attitude=None)
+    log = SimpleNamespace(time_s=time_s, stages=(logged,))
+    view = SimpleNamespace(system=SimpleNamespace(stages=(stage,)), log=log)
+    found = beyond_limits(cast(Scene, view))["speed", "van"]
+    true = 8.0 + 1.5 * math.sqrt(math.pi) * math.erf(1.0)
+    assert found.over_s == pytest.approx(2.0)
+    assert found.most == pytest.approx(true, abs=0.01)
 
 
 def louder(folder: Path, run: Scenario, factor: float, part: tuple[float, float]) -> Path:

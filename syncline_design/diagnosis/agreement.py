@@ -87,17 +87,21 @@ class WindowRows:
         return float(rough * step * np.sqrt(np.median(self.last - self.first)))
 
 
-def windows_of(time_s: Array, length_s: float) -> WindowRows | None:
-    """Windows side by side of about one length, none over a gap; None where there are too few."""
+def windows_of(time_s: Array, length_s: float, *, sliding: bool = False) -> WindowRows | None:
+    """Windows of about one length, none over a gap; None where there are too few.
+
+    Side by side, or sliding: one from every stamp.
+    """
     stamps, rows = np.unique(time_s, return_index=True)
     step = np.diff(stamps)
     usual = float(np.median(step))
     stride = max(LEAST_STEPS, round(length_s / usual))
-    first = np.arange(0, stamps.shape[0] - stride, stride)
+    apart = 1 if sliding else stride
+    first = np.arange(0, stamps.shape[0] - stride, apart)
     last = first + stride
     gaps = np.concatenate([[0], np.cumsum(step > GAP_FACTOR * usual)])
     whole = gaps[first] == gaps[last]
-    if int(np.sum(whole)) < LEAST_WINDOWS:
+    if int(np.sum(whole)) * apart < LEAST_WINDOWS * stride:
         return None
     return WindowRows(stamps, rows, first[whole], last[whole])
 

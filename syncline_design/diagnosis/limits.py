@@ -76,7 +76,7 @@ def _beyond(
     A mean over T is off by sqrt(2) pose / T then; of readings that scatter by s, by s over the
     root of their number.
     """
-    spans = windows_of(time_s, mean_s)
+    spans = windows_of(time_s, mean_s, sliding=True)  # of those side by side, none may hold a peak
     if spans is None:
         return None
     length = float(np.median(spans.length_s))
