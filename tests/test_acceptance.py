@@ -437,6 +437,31 @@ def test_a_bias_that_slower_noise_could_leave_breaks_no_figure(
     assert ("slower than this log" in row.words) == (status == "not_shown")
 
 
+@pytest.mark.parametrize(("low", "status"), [(0.98, "broken"), (0.8, "not_shown")])
+@pytest.mark.parametrize("alias", [True, False])
+def test_a_turn_that_slower_noise_could_leave_breaks_no_mounting(
+    found: Diagnosis, short: Path, low: float, status: str, alias: bool
+) -> None:
+    """0.9, 0.3 and 0.1 of an attitude's sigmas: 0.91 in squares, of 7.81 (1 - f^2) that are left:
+    2.8 beside 0.8 of the figure seen, 0.31 beside 0.98.
+    """
+    sigma = (5e-4, 5e-4, 1e-3)
+    part = found.findings[0].parameters["latency_s"]
+    turn = {f"{axis}_rad": replace(part, value=share * s, unit="rad", interval95=(0.0, 1e-3))
+            for axis, share, s in zip("xyz", (0.9, 0.3, 0.1), sigma, strict=True)}  # fmt: skip
+    others = (rival("boresight", "ranging", 0.4, x_rad=4e-4, y_rad=1e-4, z_rad=1e-4),)
+    off = replace(found.findings[0], effect="mounting", sensor="attitude", also=None, kind="cause",
+                  parameters=turn, material=True, aliases=others if alias else ())  # fmt: skip
+    split = NoiseFactors((NoiseFactor(0.9, low, 1.0),), (1.0,), sigma)
+    with pytest.MonkeyPatch.context() as patched:
+        sight = Sighted(replace(found, findings=(off,)), factors={"multirotor/attitude": split})
+        patched.setattr(acceptance, "sighted", lambda *_: sight)
+        told = accept(load(EXAMPLE), [short], AcceptSettings(), seed=0)
+    assert told.verdict == status
+    assert rows_of(told)["attitude", "mounting"].status == ("not_shown" if alias else status)
+    assert bool(told.groups) is (alias and status == "broken")
+
+
 def test_the_figure_of_a_limit_is_the_one_that_its_interval_is_of(
     known: tuple[Case, Diagnosis],
 ) -> None:

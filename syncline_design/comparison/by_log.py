@@ -8,6 +8,8 @@ from dataclasses import field, replace
 from functools import cached_property
 from typing import Final
 
+from scipy.stats import chi2
+
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_motion import CODES, by_motion
@@ -154,9 +156,35 @@ class LogEvidence:
 
     def within_figure(self, one: Assumed, finding: Finding) -> bool:
         """Whether a finding is a constant that a sensor's figure leaves to slower noise."""
-        return one.name == "noise" and self._is_slow(of_finding(finding))
+        part = of_finding(finding)
+        if one.name == "mounting":
+            return self._is_slow_turn(part)
+        return one.name == "noise" and self._is_slow_bias(part)
 
     def _is_slow(self, part: Departing) -> bool:
+        """Whether a sound sensor's noise that is slower than the log leaves as much."""
+        return self._is_slow_bias(part) or self._is_slow_turn(part)
+
+    def _is_slow_turn(self, part: Departing) -> bool:
+        """Whether a constant turn is no more than an attitude's figure leaves to such noise.
+
+        sum (a_k / sigma_k)^2 <= (1 - f^2) q, over roll, pitch and yaw or the heading alone, q the
+        95 % quantile of chi-square of as many; f as of a bias.
+        """
+        turns = [p for p in part.parameters.values() if p.unit == "rad"]
+        known = {} if self.sight is None else self.sight.factors
+        own = known.get(f"{part.stage}/{part.sensors[0]}")
+        whole = len(turns) == len(part.parameters) and len(turns) in (1, 3)
+        if own is None or not whole or part.sensors != ("attitude",):
+            return False
+        if registry()[part.effect].breaks != "mounting" or len(own.sigma) != 3:
+            return False
+        sigmas = own.sigma[-len(turns) :]  # one turn is that of the heading
+        size = sum((float(p.value) / s) ** 2 for p, s in zip(turns, sigmas, strict=True))
+        slower = max(1.0 - own.loudest.low**2, 0.0)
+        return bool(size <= slower * float(chi2.isf(0.05, len(turns))))
+
+    def _is_slow_bias(self, part: Departing) -> bool:
         """Whether a constant of a reading is no more than its figure leaves to noise that is slower
         than the log: |b| <= 1.96 sigma sqrt(1 - f^2), f the least factor that the log itself shows.
         """
