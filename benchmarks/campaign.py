@@ -3,7 +3,8 @@
     python -m benchmarks.campaign logs [--count N] [--foreign] [--kind position]
     python -m benchmarks.campaign power [--sets N] [--foreign]
     python -m benchmarks.campaign series [--series N] [--looks N] [--scatter S] [--drift D]
-        [--constants N] [--days FOLDER]
+        [--constants N] [--days FOLDER] [--store FILE]
+    python -m benchmarks.campaign delays [--series N] [--scatter S] [--days FOLDER] [--store FILE]
     python -m benchmarks.campaign quiet [--foreign]
     python -m benchmarks.campaign cover [--sets N] [--foreign]
 
@@ -13,20 +14,23 @@ drawn) and asks what is named.  The effect is added to the statistics, along the
 with such an effect are in tests/test_joint.py.  `series` draws statistics of runs like these from
 the normal law and watches them, with one effect drawn from the dictionary that differs from run to
 run by S bounds of a run, or that drifts by D bounds over all runs, and N effects of 20 bounds in
-all runs.  FOLDER: stores that `benchmarks.days --keep` left, of which the first six days are clean;
-else the logs are those that were kept.  `quiet` watches the clean logs themselves, platform by
-platform.
+all runs; every series is of one vehicle, as a store is.  `delays` moves one effect with the 11th
+run.  FOLDER: stores that `benchmarks.days --keep` left, of which the first six days are clean; else
+the logs are those that were kept.  FILE keeps a row a series; what it has is not run again.
+`quiet` watches the clean logs themselves, platform by platform.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import pickle
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -53,6 +57,7 @@ SIZES = (1, 2, 4, 9)
 BOUNDS = 3.0
 CONSTANT = 20.0  # bounds of a run, of what all runs have
 CLEAN_DAYS = 6
+DELAYED = (3.0, 5.0, 8.0)  # bounds
 SECONDS, HZ = 120.0, 5.0
 SHIPPED = ("white", "wandering")
 
@@ -161,40 +166,69 @@ def drawn(one: Sufficient, rng: np.random.Generator, values: np.ndarray) -> Suff
     return Sufficient(one.labels, normal, score, 0.0, one.gram, (left,))
 
 
-def logs_of_days(folder: Path) -> list[Sufficient]:
-    """Statistics of the clean days of watches end to end."""
-    stores = [read_store(path) for path in sorted(folder.glob("*/store.jsonl"))]
-    return [one.found for s in stores if s is not None for one in s.entries[:CLEAN_DAYS]]
+def vehicles_of_days(folder: Path) -> list[list[Sufficient]]:
+    """Statistics of the clean days of watches end to end, by vehicle: a store is of one system."""
+    found: dict[str, list[Sufficient]] = {}
+    for path in sorted(folder.glob("*/store.jsonl")):
+        stored = read_store(path)
+        if stored is not None:
+            own = found.setdefault(stored.name, [])
+            own += [one.found for one in stored.entries[:CLEAN_DAYS]]
+    return list(found.values())
 
 
-def series(
-    logs: Sequence[Sufficient],
-    count: int,
-    looks: int,
-    scatter: float,
-    drift: float,
-    constants: int,
-) -> None:
-    """False alarms over all looks, and how late a change of three bounds is heard."""
-    rings, delays = [], {3.0: [], 5.0: [], 8.0: []}
-    for k in range(count):
-        rng = np.random.default_rng([11, k])
-        group = [one for one in logs if one.labels == logs[k % len(logs)].labels]
-        picks = [group[i] for i in rng.integers(len(group), size=looks + 1)]
-        values = _unrest(picks, rng, scatter, drift) + _constants(picks, rng, constants)
-        runs = [drawn(s, rng, own) for s, own in zip(picks, values, strict=True)]
-        rings.append(_first_ring(Changes(pool_of(runs, range(looks + 1))), range(2, looks + 2)))
-        for bounds in delays if k % 4 == 0 else ():
-            delays[bounds].append(_delay(picks[:31], rng, bounds, scatter))
-        if (k + 1) % 20 == 0:
-            rung = [one for one in rings if one is not None]
-            print(f"scatter {scatter:g}, drift {drift:g}: {k + 1} series of {looks} looks: rung "
-                  f"{share(len(rung), k + 1)}, with run {sorted(rung)}", flush=True)  # fmt: skip
-    for bounds, found in delays.items():
-        heard = np.sort(found)
+def series(vehicles: Sequence[Sequence[Sufficient]], asked: argparse.Namespace) -> None:
+    """False alarms over all looks."""
+    rows = _rows(asked.store)
+    name = f"scatter {asked.scatter:g} drift {asked.drift:g} of {asked.constants} {asked.looks}"
+    known = {row["series"]: row["rung"] for row in rows if row["what"] == name}
+    for k in range(asked.series):
+        if k not in known:
+            rng = np.random.default_rng([11, k])
+            group = vehicles[k % len(vehicles)]
+            picks = [group[i] for i in rng.integers(len(group), size=asked.looks + 1)]
+            values = _unrest(picks, rng, asked.scatter, asked.drift)
+            values += _constants(picks, rng, asked.constants)
+            runs = [drawn(s, rng, own) for s, own in zip(picks, values, strict=True)]
+            changes = Changes(pool_of(runs, range(len(runs))))
+            known[k] = _first_ring(changes, range(2, len(runs) + 1))
+            _keep(asked.store, {"what": name, "series": k, "rung": known[k]})
+    rung = sorted(one for one in known.values() if one is not None)
+    print(
+        f"{name} looks: {len(known)} series, rung {share(len(rung), len(known))}, with run {rung}"
+    )
+
+
+def delays(vehicles: Sequence[Sequence[Sufficient]], asked: argparse.Namespace) -> None:
+    """How late changes of three, five and eight bounds are heard after ten runs."""
+    rows = _rows(asked.store)
+    for bounds in DELAYED:
+        name = f"delay {bounds:g} scatter {asked.scatter:g}"
+        known = {row["series"]: row["delay"] for row in rows if row["what"] == name}
+        for k in range(asked.series):
+            if k not in known:
+                rng = np.random.default_rng([13, k])
+                group = vehicles[k % len(vehicles)]
+                picks = [group[i] for i in rng.integers(len(group), size=31)]
+                known[k] = _delay(picks, rng, bounds, asked.scatter)
+                _keep(asked.store, {"what": name, "series": k, "delay": known[k]})
+        heard = np.array(list(known.values()))
         middle, late = np.quantile(heard, [0.5, 0.9])
-        print(f"change of {bounds:g} bounds after 10 runs: heard with its run number "
-              f"{middle:.0f} in the median, {late:.0f} in 90 % ({len(heard)} series)")  # fmt: skip
+        print(f"change of {bounds:g} bounds after 10 runs, scatter {asked.scatter:g}: heard with "
+              f"its run number {middle:.0f} in the median, {late:.0f} in 90 % ({len(heard)} "
+              f"series; {np.sum(heard > 20)} not within 20 runs)")  # fmt: skip
+
+
+def _rows(path: Path | None) -> list[dict[str, Any]]:
+    if path is None or not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+
+
+def _keep(path: Path | None, row: dict[str, Any]) -> None:
+    if path is not None:
+        with path.open("a", encoding="utf-8") as out:
+            out.write(json.dumps(row) + "\n")
 
 
 def _constants(picks: Sequence[Sufficient], rng: np.random.Generator, count: int) -> np.ndarray:
@@ -243,7 +277,13 @@ def _delay(
 
 
 def _first_ring(changes: Changes, looks: range) -> int | None:
-    return next((n for n in looks if changes.log_evidence(n)[0] >= np.log(20.0)), None)
+    return next((n for n in looks if _rings(changes, n)), None)
+
+
+def _rings(changes: Changes, look: int) -> bool:
+    """The doubt only lessens the evidence: it is asked where there is any."""
+    alarm = np.log(20.0)
+    return changes.mixed(look)[0] >= alarm and changes.log_evidence(look)[0] >= alarm
 
 
 def quiet(kind: str, *, is_foreign: bool) -> None:
@@ -275,7 +315,7 @@ def cover(sets: int, *, is_foreign: bool) -> None:
 
 
 def _commands() -> Iterator[str]:
-    yield from ("logs", "power", "series", "quiet", "cover")
+    yield from ("logs", "power", "series", "delays", "quiet", "cover")
 
 
 def main() -> None:
@@ -289,6 +329,7 @@ def main() -> None:
     parser.add_argument("--drift", type=float, default=0.0)
     parser.add_argument("--constants", type=int, default=0)
     parser.add_argument("--days", type=Path)
+    parser.add_argument("--store", type=Path)
     parser.add_argument("--kind", default="georeference", choices=["georeference", "position"])
     parser.add_argument("--foreign", action="store_true")
     asked = parser.parse_args()
@@ -298,13 +339,13 @@ def main() -> None:
         power(asked.sets, is_foreign=asked.foreign)
     elif asked.what == "cover":
         cover(asked.sets, is_foreign=asked.foreign)
-    elif asked.what == "series":
-        logs = (
-            [s for own in logs_of(asked.kind, is_foreign=False).values() for s in own]
+    elif asked.what in ("series", "delays"):
+        vehicles = (
+            list(logs_of(asked.kind, is_foreign=False).values())
             if asked.days is None
-            else logs_of_days(asked.days)
+            else vehicles_of_days(asked.days)
         )
-        series(logs, asked.series, asked.looks, asked.scatter, asked.drift, asked.constants)
+        (series if asked.what == "series" else delays)(vehicles, asked)
     else:
         quiet(asked.kind, is_foreign=asked.foreign)
 

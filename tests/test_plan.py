@@ -28,10 +28,12 @@ from syncline_design.machine.records import read_as
 from syncline_design.planning import next_drive
 from syncline_design.planning.drives import whole_drive
 from syncline_design.planning.result import Plan
+from syncline_design.planning.run import plan as planned
 from syncline_design.planning.search import lasting_s
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.standard import MOST_LEGS, Lines, most_within
 from syncline_design.planning.telling import PlanRun
+from syncline_design.planning.wanted import PlanWanted, reach_of
 from syncline_design.report.diagnoses import render_diagnose
 from syncline_design.report.plans import render_plan
 from syncline_design.report.result_schemas import result_schema
@@ -324,6 +326,17 @@ def test_line_plans_are_taken_leg_by_leg_with_their_turns() -> None:
     for most in (0, 1, 2, 3, 7, 64, 1000):
         assert most_within(lambda count, most=most: count <= most) == most  # type: ignore[misc]
     assert most_within(lambda _: True) == MOST_LEGS
+
+
+def test_a_drive_is_the_same_where_no_line_plans_are_judged_beside_it(
+    run: PlanRun, spec: Path
+) -> None:
+    """As `diagnose` asks for it, which shows none."""
+    alone = planned(load(spec), PlanRequest(PlanWanted(reach_of(REACH)), line_plans=False))
+    assert run.result.standard
+    assert not alone.result.standard
+    assert alone.result.after == run.result.after
+    assert alone.result.legs == run.result.legs
 
 
 def test_no_line_plan_that_tells_as_much_is_much_shorter(run: PlanRun, pair: PlanRun) -> None:

@@ -10,19 +10,17 @@ any value that they can have.  Those that they do not show are small: 0 to withi
 own standard deviations by all these runs.  Were every one of them free, a day that is driven
 otherwise than the days before would say next to nothing: some sum of constants that those days did
 not show would do for any change.
-Nobody knows by how much c differs from run to run while nothing is moved.  Its runs have phi times
-the variance that their noise says, phi from an inverse gamma law of mean about 1, and R is their
-scatter, before k and from k on each about its own mean, of f free values:
-    B_ck = |1 + N D|^-1/2 ((v + R + Q) / (v + R + Q - h))^((v + f + p) / 2),
-    Q = s' N^-1 s,   h = s' (N + D^-1)^-1 s,   d ~ N(0, phi D),
-a Student ratio: one day far off is a change where its runs agreed before, and none where they do
-not or where they are few.  v = RUNS_KNOWN, which many runs outweigh.
-An effect that clearly differs from run to run is freed in each run to the extent that it does, for
-its scatter moves the others, by other amounts in runs that are driven otherwise.
+An effect that differs from run to run while nothing is moved would pass for a change of it, or of a
+commoner one that moves the runs alike.  So the runs are held against that, too: L_a is how much
+likelier they are where effect a has a value of its own in every run, normal about the common one,
+and p_a the odds of it.  What clearly differs (Q of its runs, parted at any k) is freed in each run
+to the extent that it does, for all others too.
 Mixed over effects with weights w_c (the common ones have more) and over k with weights w_k, each of
-sum one (changes that did not happen yet count one), E_n = sum w_k w_c B_ck is an e-process: without
-a change it reaches 1 / alpha at any look, of however many, with a chance of at most alpha (Ville's
-inequality, over the law of phi; docs/joint.md has what single values of it come to).
+sum one (changes that did not happen yet count one),
+    E_n = sum w_k w_c B_ck / (1 + sum p_a L_a)
+is an e-process: with one value of every effect, or with values that differ as the mixture has it,
+it reaches 1 / alpha at any look, of however many, with a chance of at most alpha (Ville's
+inequality; docs/joint.md has what single sizes of scatter come to).
 Noise inside runs that is not the model's: the variance grows by what the scatter of the parts of
 runs has beyond it.
 Sources: Ville (1939); Ramdas, Gruenwald, Vovk, Shafer, Statistical Science 38 (2023), on
@@ -39,7 +37,14 @@ import numpy as np
 
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
-from syncline_design.campaign.scatter import RunScatter, freed_of, log_bayes, scattered
+from syncline_design.campaign.scatter import (
+    RunScatter,
+    freed_of,
+    log_bayes,
+    log_differing,
+    log_odds_apart,
+    scattered,
+)
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -89,11 +94,13 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Information and score of runs, their sum with the prior, and the scatter of each effect."""
+    """Information and score of runs, their sum with the prior and its inverse, and the scatter of
+    each effect."""
 
     normal: Array
     score: Array
     total: Array
+    inverse: Array
     scatters: tuple[RunScatter, ...]
 
 
@@ -144,13 +151,14 @@ class Changes:
         less = self.pool.less[run]
         if not less:
             return np.ones(len(self.terms))
-        values = _values(self.pool.normal[run] + np.diag(self.prior), self.pool.score[run])
-        lefts = [(part.normal, part.score - part.normal @ values) for part in less]
-        scatter = [
-            [_scatter(self.pool.normal[run], *left, term.index) for term in self.terms]
-            for left in lefts
-        ]
-        return np.asarray(np.max(scatter, axis=0))
+        whole = self.pool.normal[run]
+        values = _pseudo_inverse(whole + np.diag(self.prior)) @ self.pool.score[run]
+        found = np.zeros((len(less), len(self.terms)))
+        for k, part in enumerate(less):
+            left = part.score - part.normal @ values
+            for group in self.groups:
+                found[k, group.terms] = _scatter(whole, part.normal, left, group)
+        return np.asarray(np.max(found, axis=0))
 
     @cached_property
     def log_weights(self) -> Array:
@@ -161,9 +169,32 @@ class Changes:
 
     def log_evidence(self, look: int) -> tuple[float, Array]:
         """log E_n of the first `look` runs, and log w_k w_c B_ck of every k from 1 and c."""
+        mixed, table = self.mixed(look)
+        return mixed - self.doubt(look), table
+
+    def mixed(self, look: int) -> tuple[float, Array]:
+        """The same where no effect may differ from run to run: log sum w_k w_c B_ck."""
         weights = np.array([weight_of(k + 1) for k in range(1, look)])
         table = np.log(weights)[:, None] + self._factors(look) + self.log_weights
         return float(np.logaddexp.reduce([*table.ravel(), math.log(_later(look + 1))])), table
+
+    def doubt(self, look: int) -> float:
+        """log (1 + sum p_a L_a): how much likelier the first runs are where some effect may differ
+        from run to run than where none does."""
+        runs, inside = self._runs(look), self._inside(look)
+        prior = runs.total - runs.normal.sum(axis=0)
+        usual = runs.normal.mean(axis=0)
+        found = [np.zeros(1)]
+        for term, factor in zip(self.terms, inside, strict=True):
+            by = log_differing(
+                runs.normal / factor,
+                runs.score / factor,
+                prior / factor,
+                term.index,
+                inverted(usual[np.ix_(term.index, term.index)]) * factor,
+            )
+            found.append(log_odds_apart(len(self.terms)) + by)
+        return float(np.logaddexp.reduce(np.concatenate(found)))
 
     @cached_property
     def course(self) -> Array:
@@ -184,14 +215,12 @@ class Changes:
     def _factors(self, look: int) -> Array:
         """log B_ck of every k from 1 and c, (look - 1, C)."""
         found = np.zeros((look - 1, len(self.terms)))
-        parts = zip(self.groups, *self._freed(look), self._runs(look).scatters, strict=True)
-        for group, normal, score, scatter in parts:
+        for group, normal, score in zip(self.groups, *self._freed(look), strict=True):
             inside = self._inside(look)[group.terms]
             found[:, group.terms] = log_bayes(
                 normal / inside[:, None, None],
                 score / inside[:, None],
                 self._reach(look, group),
-                scatter,
             )
         return found
 
@@ -217,7 +246,7 @@ class Changes:
         if look in self._last:
             return self._last[look]
         runs = self._runs(look)
-        normal, score, inverse = runs.normal, runs.score, _pseudo_inverse(runs.total)
+        normal, score, inverse = runs.normal, runs.score, runs.inverse
         later = np.cumsum(normal[::-1], axis=0)[::-1][1:]
         scores = np.cumsum(score[::-1], axis=0)[::-1][1:]
         cross = later @ inverse
@@ -280,7 +309,8 @@ class Changes:
         """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
         together; parted at every k from 1, and not parted."""
         total = self._total(look, normal, score)
-        left = score - normal @ _values(total, score.sum(axis=0))
+        inverse = _pseudo_inverse(total)
+        left = score - normal @ (inverse @ score.sum(axis=0))
         found = []
         for g in self.groups:
             blocks = normal[:, *g.blocks]
@@ -289,7 +319,7 @@ class Changes:
             found.append(
                 RunScatter.of(squares / self._inside(look)[g.terms], seen, g.index.shape[1])
             )
-        return Runs(normal, score, total, tuple(found))
+        return Runs(normal, score, total, inverse, tuple(found))
 
     def _scattering(self, runs: Runs) -> tuple[Index, Array] | None:
         """The effect that differs most clearly from run to run, and the covariance by which it does
@@ -345,12 +375,6 @@ class Changes:
         return found
 
 
-def _values(total: Array, score: Array) -> Array:
-    """total^-1 score, columns scaled alike first."""
-    found: Array = _pseudo_inverse(total) @ score
-    return found
-
-
 def _pseudo_inverse(total: Array) -> Array:
     """total^-1 (..., P, P), columns scaled alike first."""
     size = np.diagonal(total, axis1=-2, axis2=-1)
@@ -360,14 +384,14 @@ def _pseudo_inverse(total: Array) -> Array:
     return found
 
 
-def _scatter(normal: Array, normals: Array, scores: Array, index: Index) -> float:
-    """Mean over an effect's parameters of the jackknife's variance over the fitted one."""
-    own = normals[:, index[:, None], index]
-    values = np.einsum("gab,gb->ga", inverted(own), scores[:, index])
-    count = len(values)
+def _scatter(whole: Array, normals: Array, scores: Array, group: Group) -> Array:
+    """Mean over an effect's parameters of the jackknife's variance over the fitted one, (G,).
+
+    normals (n, P, P), scores (n, P): of a run without each of its parts.
+    """
+    own = whole[group.blocks]
+    values = np.einsum("ngab,ngb->nga", inverted(normals[:, *group.blocks]), scores[:, group.index])
     off = values - values.mean(axis=0)
-    seen = int(np.sum(np.diag(normal)[index] > 0.0))
-    if not seen:
-        return 1.0
-    spread = (count - 1) / count * np.einsum("ga,ab,gb->", off, normal[index[:, None], index], off)
-    return float(spread) / seen
+    seen = np.sum(np.einsum("gaa->ga", own) > 0.0, axis=-1)
+    spread = (1.0 - 1.0 / len(values)) * np.einsum("nga,gab,ngb->g", off, own, off)
+    return np.asarray(np.where(seen > 0, spread / np.maximum(seen, 1), 1.0))

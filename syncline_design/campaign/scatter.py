@@ -11,6 +11,9 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 RUNS_KNOWN: Final = 17.0  # runs that the noise fitted counts for, against the scatter of runs
+APART: Final = (1.5, 4.0)  # bounds of a run by which an effect may differ from run to run
+DIFFERING: Final = 0.25  # odds of some effect differing from run to run against none doing so
+ROUNDED: Final = 1e-12
 MOST_LOG: Final = 690.0  # exp of no more stays within a double (709), with room for a sum
 
 
@@ -18,15 +21,13 @@ MOST_LOG: Final = 690.0  # exp of no more stays within a double (709), with room
 class RunScatter:
     """Of runs parted at every k from 1, and not parted, by term of a group: (look, G).
 
-    shape: (v + f + p) / 2 and scale: v + R of the law of their variance over that fitted; R is
-    taken as f at least, for what the noise inside runs makes is always there.  square, free: R, f.
+    square, free: R and its free values f.  factor: their variance over that fitted as far as it is
+    known, R taken as f at least, for what the noise inside runs makes is always there.
     """
 
-    shape: Array
-    scale: Array
+    factor: Array
     square: Array
     free: Index
-    size: int
 
     @classmethod
     def of(cls, squares: Array, seen: Index, size: int) -> RunScatter:
@@ -34,13 +35,8 @@ class RunScatter:
         before = np.cumsum(seen, axis=0)
         after = before[-1] - before
         free = np.maximum(before - size, 0) + np.maximum(after - size, 0)
-        scale = RUNS_KNOWN + np.maximum(squares, free)
-        return cls(0.5 * (RUNS_KNOWN + free + size), scale, squares, free, size)
-
-    @property
-    def factor(self) -> Array:
-        """The variance over that fitted, as far as it is known."""
-        return self.scale / (2.0 * self.shape - self.size)
+        factor = (RUNS_KNOWN + np.maximum(squares, free)) / (RUNS_KNOWN + free)
+        return cls(factor, squares, free)
 
 
 def scattered(normals: Array, inverses: Array, scores: Array) -> Array:
@@ -72,8 +68,11 @@ def _explained(normal: Array, score: Array) -> Array:
     return found
 
 
-def log_bayes(normal: Array, score: Array, reach: Array, scatter: RunScatter) -> Array:
-    """log B of N (n, G, p, p), s (n, G, p) and D (G, p, p), which may have no inverse."""
+def log_bayes(normal: Array, score: Array, reach: Array) -> Array:
+    """log B = (s' (N + D^-1)^-1 s - log|1 + N D|) / 2 of N (n, G, p, p), s (n, G, p), D (G, p, p).
+
+    D may have no inverse.
+    """
     values, vectors = np.linalg.eigh(reach)
     root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
     inner = np.eye(reach.shape[-1]) + np.swapaxes(root, -1, -2) @ normal @ root
@@ -84,7 +83,59 @@ def log_bayes(normal: Array, score: Array, reach: Array, scatter: RunScatter) ->
         size = np.linalg.slogdet(inner)[1]
         solved = np.linalg.solve(inner, turned[..., None])[..., 0]
         square = np.sum(turned * solved, axis=-1)
-    left = np.maximum(_explained(normal, score) - square, 0.0)
-    student = scatter.shape[:-1] * np.log1p(square / (scatter.scale[:-1] + left))
-    found: Array = np.minimum(student - 0.5 * size, MOST_LOG)
+    found: Array = np.minimum(0.5 * (square - size), MOST_LOG)
+    return found
+
+
+def log_odds_apart(effects: int) -> Array:
+    """log of the odds that one of so many effects differs by each of APART against none doing so:
+    each as likely as the next, and what is so many times as wide seldomer by the square of it."""
+    rare = np.array(APART) ** -2.0
+    found: Array = np.log(DIFFERING * rare / (np.sum(rare) * effects))
+    return found
+
+
+def log_differing(normal: Array, score: Array, prior: Array, index: Index, usual: Array) -> Array:
+    """log of how much likelier runs are where an effect has a value of its own in each, of the
+    covariances APART^2 `usual` (p, p) about what is common, than where it is one value, (S,).
+
+    normal (n, P, P), score (n, P); prior (P, P) of what is common.  With K = S (1 + N_aa S)^-1 of a
+    run, N_aa its information of the effect and s its score of it,
+        log L = sum (s' K s - log|1 + N_aa S|) / 2 + (g' T^-1 g - log|T|)' / 2 - (the same)_0 / 2,
+    T and g the sums over runs, with the effect freed in each and as they are.
+    """
+    across, own = normal[:, :, index], score[:, index]
+    inner = np.eye(index.size) + normal[:, index[:, None], index] @ _spreads(usual)[:, None]
+    kept = _spreads(usual)[:, None] @ np.linalg.inv(inner)
+    moved = _side_by_side(across @ kept)
+    total, scores = normal.sum(axis=0) + prior, score.sum(axis=0)
+    totals = total - moved @ _side_by_side(across).T
+    lefts = scores - moved @ own.ravel()
+    alone = np.einsum("ra,srab,rb->s", own, kept, own)
+    alone -= np.sum(np.linalg.slogdet(inner)[1], axis=-1)
+    every = _fitted(np.concatenate([total[None], totals]), np.concatenate([scores[None], lefts]))
+    found: Array = 0.5 * (alone + every[1:] - every[0])
+    return found
+
+
+def _spreads(usual: Array) -> Array:
+    found: Array = np.square(APART)[:, None, None] * usual
+    return found
+
+
+def _side_by_side(blocks: Array) -> Array:
+    """(..., n, P, p) as (..., P, n p)."""
+    turned = np.swapaxes(blocks, -3, -2)
+    return turned.reshape(*turned.shape[:-2], -1)
+
+
+def _fitted(total: Array, score: Array) -> Array:
+    """g' T^-1 g - log|T| of several, columns scaled alike first; T of full rank."""
+    size = np.sqrt(np.diagonal(total[0]))
+    scaled = 0.5 * (total + np.swapaxes(total, -1, -2)) / (size[:, None] * size)
+    scaled += ROUNDED * np.eye(size.size)  # effects that are one but for rounding
+    root = np.linalg.cholesky(scaled)
+    white = np.linalg.solve(root, (score / size)[..., None])[..., 0]
+    logs = 2.0 * np.sum(np.log(np.diagonal(root, axis1=-2, axis2=-1)), axis=-1)
+    found: Array = np.sum(white**2, axis=-1) - logs
     return found

@@ -86,7 +86,7 @@ def _told(case: Case, one: AliasClass) -> NextDrive | None:
     lost: list[NamedEffect] = []
     for rival in one.rivals[:MOST_TRIED]:
         commonest = one.only([rival])
-        run = plan(case, PlanRequest(PlanWanted((), commonest.pairs)))
+        run = _planned(case, commonest)
         if run.result.least_minutes is not None:
             return _whole(case, one.only([r for r in one.rivals if r not in lost]), lost) or (
                 _short(case, run, commonest, lost)
@@ -100,12 +100,17 @@ def _whole(case: Case, one: AliasClass, lost: Sequence[NamedEffect]) -> NextDriv
     if len(one.rivals) < 2:
         return None
     try:
-        run = plan(case, PlanRequest(PlanWanted((), one.pairs)))
+        run = _planned(case, one)
     except NoVerdict:
         return None
     more = [r for r in one.rivals if f"{one.first.text} and {r.text}" in run.result.inseparable]
     kept = one.only([r for r in one.rivals if r not in more])
     return _short(case, run, kept, [*lost, *more]) if run.result.reached and kept.rivals else None
+
+
+def _planned(case: Case, one: AliasClass) -> PlanRun:
+    """The drive alone: nothing is said here of the field's line plans."""
+    return plan(case, PlanRequest(PlanWanted((), one.pairs), line_plans=False))
 
 
 _TOO_LATE: Final = (

@@ -57,7 +57,7 @@ MOST_OF_ALL: Final = 1e4  # times all legs: what that does not tell apart, no dr
 class PlanRequest:
     """What a plan is asked for; none of all: a commissioning drive.
 
-    targets: those that are surveyed already.
+    targets: those that are surveyed already.  line_plans: whether the field's are judged beside it.
     """
 
     asked: PlanWanted = NOTHING_ASKED
@@ -66,6 +66,7 @@ class PlanRequest:
     flown: tuple[Path, ...] = ()
     seed: int = 0
     targets: FixedTargets | None = None
+    line_plans: bool = True
 
 
 @dataclass(frozen=True, eq=False)

@@ -111,7 +111,7 @@ class Telling:
             rate_hz=self.setup.world.rate_hz,
             noise=_noise_words(self.setup.world),
             priors=dict(zip(self.setup.keys, map(float, self.setup.judge.prior), strict=True)),
-            standard=self._standard(found),
+            standard=self._standard(found) if self.setup.request.line_plans else (),
             targets=_targets(found.driven, self.setup.request.targets),
             surveyed=self.setup.world.surveyed is not None,
             assumed=_assumed(self.setup.world),
