@@ -11,8 +11,8 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 RUNS_KNOWN: Final = 17.0  # runs that the noise fitted counts for, against the scatter of runs
-APART: Final = (1.5, 4.0)  # bounds of a run by which an effect may differ from run to run
-DIFFERING: Final = 0.25  # odds of some effect differing from run to run against none doing so
+APART: Final = (1.0, 3.0)  # bounds of a run by which an effect may differ from run to run
+DIFFERING: Final = 0.3  # odds of some effect differing from run to run against none doing so
 ROUNDED: Final = 1e-12
 MOST_LOG: Final = 690.0  # exp of no more stays within a double (709), with room for a sum
 
