@@ -196,3 +196,31 @@ def _add(
         sound.append(names)
     assert one.bound_s is not None
     bounds.append((row.residual_s.bound or 0.0) / one.bound_s)
+
+
+@pytest.mark.parametrize(("rates", "set_by"), [
+    ((10.0, 4.0), 1.31), ((125.0, 200.0), 0.337), ((125.0, 4.0), -0.2), ((50.0, 10.0), -1.1),
+])  # fmt: skip
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_clock_that_is_set_is_told_from_two_streams_one_of_which_slips(
+    tmp_path: Path, rates: tuple[float, float], set_by: float, seed: int
+) -> None:
+    """The slip is of one stream, the jump of both receipts the recorder's; delays are left."""
+    rng = np.random.default_rng(seed)
+    paths, delays = [], []
+    for name, rate in zip("ab", rates, strict=True):
+        t = even(rate)
+        delay = 0.002 + rng.gamma(2.0, 5e-4, t.size)
+        came = np.maximum.accumulate(t + delay)
+        stamp = t - ((t > 17.0) & (t < 24.0)) if name == "a" else t
+        receive = came + set_by * (came > 46.6)
+        stamp_ns, receive_ns = (np.rint(x * 1e9).astype(np.int64) for x in (stamp, receive))
+        paths.append(written(tmp_path / f"{name}.csv", stamp_ns + BEGAN_NS, receive_ns + BEGAN_NS))
+        delays.append(float(np.ptp(came - t)))
+    a, b = sorted(audit(paths).streams, key=lambda row: row.name)
+    assert set(found(a)) == {"recorder_clock", "whole_second_slip"}
+    assert set(found(b)) == {"recorder_clock"}
+    for row, delay_s in zip((a, b), delays, strict=True):
+        seconds = float(found(row)["recorder_clock"].parameters["seconds"])
+        assert abs(seconds) == pytest.approx(abs(set_by), abs=0.01)
+        assert row.residual_s.bound == pytest.approx(delay_s, rel=0.1)

@@ -16,7 +16,7 @@ import numpy as np
 from syncline_design.auditing.clock_shapes import Shape, straddling
 from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Array, in_words
+from syncline_design.auditing.series import NS, Array, in_words, seconds, spread
 from syncline_design.auditing.stream import Examined, examined
 from syncline_design.logs.readers.stream import UNSET
 from syncline_design.machine.quick_dataclass import dataclass
@@ -27,6 +27,12 @@ _ALIKE: Final = 0.25  # of a size
 _EDGE_S: Final = 0.02
 _BESIDE: Final = 30  # messages that tell a level
 _LEFT: Final = 0.03  # of a course: what may be left of it
+_NEXT_TO: Final = 12  # messages on each side that show a jump by themselves
+_NEAR_S: Final = 1.0
+_MOST_NEAR: Final = 4000
+_CALM: Final = 0.4  # of a jump: how far delays beside it may scatter
+_TOLD: Final = 0.1  # and so that how late a message is tells its side
+_KEPT: Final = 0.35  # and how near stamps keep to their rhythm
 _OWN: Final = 0.5  # of a size: what stamps show themselves by so much is theirs
 
 
@@ -51,9 +57,24 @@ def without_recorder_clock(streams: Sequence[Examined], start: int | None) -> li
 
 
 def _said(streams: Sequence[Examined]) -> list[StampFault]:
-    """Times that receipts of most streams were seen to go back."""
+    """Times that receipts of most streams were seen to go back, or their levels to jump so."""
     every = [f for one in streams for f in one.faults if f.fault == "recorder_clock"]
-    return [f for f in every if 1 + sum(_same(f, g) for g in every) > _SHARE * len(streams)]
+    quiet = [one for one in streams if not any(f.fault == "recorder_clock" for f in one.faults)]
+    return [
+        f for f in every
+        if 1 + sum(_same(f, g) for g in every) + sum(_shows(one, f) is not None for one in quiet)
+        > _SHARE * len(streams)
+    ]  # fmt: skip
+
+
+def _shows(one: Examined, fault: StampFault) -> Shape | None:
+    """The jump of a stream's levels that a clock that was set back makes."""
+    size, at = -float(fault.parameters["seconds"]), fault.from_s or 0.0
+    for shape in one.seen:
+        near = abs(shape.begin_s - at) < 2.0 + abs(size)
+        if shape.kind == "step" and near and abs(shape.size_s - size) < _ALIKE * abs(size):
+            return shape
+    return None
 
 
 def _same(one: StampFault, other: StampFault) -> bool:
@@ -69,11 +90,9 @@ def _as_said(one: Examined, said: Sequence[StampFault], start: int | None) -> Ex
     if one.series.receive is None or any(f.fault == "recorder_clock" for f in one.faults):
         return one
     for fault in said:
-        size, at = -float(fault.parameters["seconds"]), fault.from_s or 0.0
-        for shape in one.seen:
-            near = abs(shape.begin_s - at) < 2.0 + abs(size)
-            if shape.kind == "step" and near and abs(shape.size_s - size) < _ALIKE * abs(size):
-                return _again(one, _Course((shape,), 1 + len(said)), start)
+        shape = _shows(one, fault)
+        if shape is not None:
+            return _again(one, _Course((shape,), 1 + len(said)), start)
     return one
 
 
@@ -125,6 +144,10 @@ def _confirms(one: Examined, shapes: tuple[Shape, ...]) -> list[bool | None] | N
     sizes, sigma = _fit(columns, low, blocks.noise_s)
     votes: list[bool | None] = []
     for k, shape in enumerate(shapes):
+        seen = _seen_beside(one, shape) if shape.kind == "step" else None
+        if seen is not None:
+            votes.append(seen)
+            continue
         size, sure = float(sizes[k + 2]), float(sigma[k + 2])
         there = float(time_s[0]) < shape.begin_s < float(time_s[-1])
         if not there or sure * SURE > abs(shape.size_s) or sure <= 0.0:
@@ -134,6 +157,42 @@ def _confirms(one: Examined, shapes: tuple[Shape, ...]) -> list[bool | None] | N
         else:
             votes.append(abs(size - shape.size_s) < _ALIKE * abs(shape.size_s) + 3.0 * sure)
     return votes
+
+
+def _seen_beside(one: Examined, shape: Shape) -> bool | None:
+    """Whether the messages next to a jump show it in their receipts while stamps keep their rhythm,
+    whatever else the stream has elsewhere; None where they do not tell.
+
+    Medians of some messages on each side, so that neither their order nor one of them matters.
+    """
+    raw, side = one.raw, _NEXT_TO
+    places = raw.places()
+    if raw.receive is None or places.size < 8 * side:
+        return None
+    stamp, receive = (
+        seconds(raw.stamp[places] - raw.start),
+        seconds(raw.receive[places] - raw.start),
+    )
+    late = receive - stamp
+    near = np.flatnonzero(np.abs(receive - shape.begin_s) <= abs(shape.size_s) + _NEAR_S)
+    near = near[(near >= 3 * side) & (near < places.size - side)]
+    if not near.size or near.size > _MOST_NEAR:
+        return None
+    moved = [float(np.median(late[k : k + side]) - np.median(late[k - side : k])) for k in near]
+    at = int(near[int(np.argmax(np.abs(moved)))])
+    before, after = slice(at - side, at), slice(at, at + side)
+    if max(spread(late[before]), spread(late[after])) > _CALM * abs(shape.size_s):
+        return None
+    middle = [
+        float(np.median(stamp[part])) for part in (slice(at - 2 * side, at - side), before, after)
+    ]
+    jumped = (middle[2] - middle[1]) - (middle[1] - middle[0])
+    alike = abs(float(moved[int(at - near[0])]) - shape.size_s) < _ALIKE * abs(shape.size_s)
+    if not alike:
+        return None
+    if abs(jumped) < _KEPT * abs(shape.size_s):
+        return True
+    return False if abs(jumped + shape.size_s) < _KEPT * abs(shape.size_s) else None
 
 
 def _fit(columns: Array, low: Array, noise_s: float) -> tuple[Array, Array]:
@@ -199,8 +258,11 @@ def _moved(shape: Shape, times: Array, late: Array) -> Array:
     before, after = np.abs(part), np.abs(part - shape.size_s)
     cost = np.concatenate([[0.0], np.cumsum(before)])
     cost += np.concatenate([np.cumsum(after[::-1])[::-1], [0.0]])
-    split = first + int(np.argmin(cost))
-    return np.where(np.arange(times.size) >= split, shape.size_s, 0.0)
+    new = np.arange(times.size) >= first + int(np.argmin(cost))
+    if around.size and spread(around) < _TOLD * abs(shape.size_s):  # each message by itself
+        sure = np.minimum(before, after) < 2.0 * _TOLD * abs(shape.size_s)
+        new[first:last] = np.where(sure, after < before, new[first:last])
+    return np.where(new, shape.size_s, 0.0)
 
 
 def _is_left(fault: StampFault, shapes: Sequence[Shape]) -> bool:
