@@ -25,7 +25,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from types import ModuleType
 
-from benchmarks import audit_corpus, audit_corpus_other, audit_recordings
+from benchmarks import audit_corpus, audit_corpus_other, audit_recordings, audit_together
 from benchmarks.audit_corpus import Made, MadeRecording
 from syncline_design import __version__
 from syncline_design.auditing.result import StreamAudit
@@ -302,6 +302,7 @@ def main() -> None:
         ("first corpus", scored(audit_corpus, given.seed, given.each, given.sound)),
         ("second corpus", scored(audit_corpus_other, given.seed, given.each, given.sound)),
         ("recordings", scored(audit_recordings, given.seed, given.each // 2, given.sound // 2)),
+        ("out of order", scored(audit_together, given.seed, given.each // 2, given.sound // 4)),
     ]
     beside = peers(given.peers, given.seed, 2, 2) if given.peers else {}
     logs = sum(sum(s.planted.values()) + sum(s.sound.values()) for _, s in scores)
