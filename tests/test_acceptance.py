@@ -276,6 +276,31 @@ def test_an_arm_does_not_come_and_go(
     assert rows_of(either)["position", "lever_arm"].status == "not_shown"
 
 
+def test_data_younger_than_their_stamps_may_be_all_others_that_are_late(
+    found: Diagnosis, short: Path
+) -> None:
+    """An INS late as one device is the same log as ranges that are early: neither is said alone."""
+    (late,) = [f for f in found.findings if f.effect == "latency"]
+    own = late.parameters["latency_s"]
+    early = replace(own, value=-float(own.value), interval95=(-LATENCY_S - 1e-3, -LATENCY_S + 1e-3))
+    ranges = replace(late, sensor="ranging", parameters={"latency_s": early}, aliases=())
+    told = seen_as(replace(found, findings=(ranges,)), short)
+    assert (told.verdict, told.exit_code) == ("broken", 1)
+    (group,) = told.groups
+    assert group.rows == tuple(f"multirotor/{role}/latency"
+                               for role in ("attitude", "position", "ranging"))  # fmt: skip
+    assert [len(way.departures[0].rows) for way in group.ways] == [1, 2]
+    assert group.tell_apart is None  # a delay common to all sensors moves nothing that stands still
+    for role, sign in (("position", 1.0), ("attitude", 1.0), ("ranging", -1.0)):
+        row = rows_of(told)[role, "latency"]
+        assert row.status == "not_shown"
+        assert row.measured is not None
+        assert row.measured.value == pytest.approx(sign * LATENCY_S, abs=1e-3)
+        assert row.measured.low is not None
+        assert row.measured.high is not None
+        assert row.measured.low < row.measured.value < row.measured.high
+
+
 def test_a_row_that_every_explanation_breaks_is_broken(found: Diagnosis, short: Path) -> None:
     """A delay that grows with the frequency is one as well: the row is the same."""
     lag = rival("filter_lag", "position", 0.4, time_constant_s=0.087)

@@ -585,3 +585,18 @@ def test_sessions_of_different_length_are_said(tmp_path: Path) -> None:
         paths += sessions_csv(folder, [1e-5], count=count, seed=k)
     notes = study_logs(paths, TimingSettings()).timing.notes
     assert any("the claim is for such a mixture" in note for note in notes)
+
+
+def test_the_session_that_makes_a_bound_wide_is_named(tmp_path: Path) -> None:
+    """Four sessions of 40 us and one that stepped by 2 ms: its start is said beside the width."""
+    rng = np.random.default_rng(5)
+    logs = []
+    for day in range(5):
+        late = 4e-5 + 4e-6 * rng.standard_normal(400) + (2e-3 if day == 3 else 0.0)
+        rows = (f"{START + 86400 * day + 10 * k:.0f},{1e6 * x:.3f}" for k, x in enumerate(late))
+        logs.append(write(tmp_path / f"{day}.csv", ["time_s,offset_us", *rows]))
+    result = study_logs(logs, TimingSettings()).timing
+    (said,) = [note for note in result.notes if "times the largest session" in note]
+    assert f"the session from {result.sessions[3].from_} alone" in said
+    even = study_logs(logs[:3], TimingSettings()).timing
+    assert not [note for note in even.notes if "alone makes it" in note]

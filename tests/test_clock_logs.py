@@ -193,6 +193,35 @@ def test_another_export_of_a_session_is_that_session(how: str, tmp_path: Path) -
         read_logs([first, again])
 
 
+@pytest.mark.parametrize(
+    ("later_s", "factor", "digits"), [(3600.0, 1e6, 3), (-START, 1e6, 3), (-START, -1e6, 1)]
+)
+def test_a_session_on_another_time_base_is_that_session(
+    later_s: float, factor: float, digits: int, tmp_path: Path
+) -> None:
+    """In another zone, or from its own start: offsets that come back to the last digit are one."""
+    rng = np.random.default_rng(11)
+    times = START + 10.0 * np.arange(300) + rng.uniform(0.0, 0.3, 300)
+    late = 3e-4 + 1e-5 * rng.standard_normal(300)
+    first = write(tmp_path / "a.csv", _table("us", times, late, 1e6, 3))
+    again = write(tmp_path / "b.csv", _table("us", times[50:] + later_s, late[50:], factor, digits))
+    with pytest.raises(BadInput, match=r"the same session as in .* 250 rows of CSV"):
+        read_logs([first, again])
+
+
+@pytest.mark.parametrize("kind", ["few levels", "ramp", "noise"])
+def test_sessions_that_are_alike_are_not_one(kind: str, tmp_path: Path) -> None:
+    """Offsets of a few nanoseconds, a steady drift, or noise about one bias: 20 days of each."""
+    rng = np.random.default_rng(13)
+    logs = []
+    for day in range(20):
+        times = START + 86400.0 * day + 10.0 * np.arange(300)
+        late = {"few levels": 1e-9 * rng.integers(-2, 3, 300), "ramp": 1e-8 * np.arange(300),
+                "noise": 3e-4 + 1e-6 * rng.standard_normal(300)}[kind]  # fmt: skip
+        logs.append(write(tmp_path / f"{day}.csv", _table("ns", times, late, 1e9, 0)))
+    assert len(read_logs(logs).series) == 20
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_clocks_compared_at_the_same_moments_are_not_one_session(seed: int, tmp_path: Path) -> None:
     """Two clocks of one room: half of their noise, and the day's temperature, is one."""

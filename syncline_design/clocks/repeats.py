@@ -1,8 +1,12 @@
-"""One session given twice: as it is, in part, or as another program exported it."""
+"""One session given twice: as it is, in part, or as another program exported it.
+
+An export may count its time from another start, or in another zone: then the same offsets follow
+one another at the same intervals.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -10,6 +14,7 @@ import numpy as np
 
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.series import Array, ClockSeries
+from syncline_design.model.figure_text import format_duration
 
 _HINT: Final = "a session counts once: give each once"
 _FEWEST: Final = 10  # rows whose offsets can be told to move alike
@@ -17,6 +22,10 @@ _SAME_STAMP: Final = 0.05  # of the usual time between rows: what an export roun
 _ALIKE: Final = 0.99  # correlation of what two logs' offsets move from row to row
 _ROUNDED: Final = 0.95  # share of rows that differ by no more than the coarser log's rounding
 _FINEST_S: Final = 1e-15  # below it offsets differ by arithmetic alone
+_PROBE: Final = 12  # rows in a row by which one log is looked for in another
+_LEVELS: Final = 6  # steps that these take: fewer come back by chance, or by a drift
+_DAY_S: Final = 86400.0  # zones are less apart
+_STARTS: Final = (0.0, 0.35, 0.7)  # shares of a log at which such rows begin
 
 
 def demand_once(series: Sequence[ClockSeries]) -> None:
@@ -28,7 +37,10 @@ def demand_once(series: Sequence[ClockSeries]) -> None:
         rows = one.time_s + 1j * one.offset_s
         most = max(2, len(one) // 20)
         for other in series[:index]:
-            if other.kind.name != one.kind.name or _apart(one, other):
+            if other.kind.name != one.kind.name:
+                continue
+            _demand_apart(one, other, most)
+            if _apart(one, other):
                 continue
             exactly = int(np.sum(np.isin(rows, other.time_s + 1j * other.offset_s)))
             twice = max(exactly, _followed(one, other))
@@ -40,6 +52,48 @@ def demand_once(series: Sequence[ClockSeries]) -> None:
         if len(one.files) > 1 and len(one) - np.unique(rows).shape[0] > most:
             raise refused(Path(one.files[-1]), f"the same session as in {one.files[0]}",
                           found="rows with the same stamp and offset", hint=_HINT)  # fmt: skip
+
+
+def _demand_apart(one: ClockSeries, other: ClockSeries, most: int) -> None:
+    """Refuses a log whose offsets another holds as well, one after the other, at another time."""
+    rows, later_s = _elsewhere(one, other)
+    if rows > most:
+        when = f"{format_duration(abs(later_s))} {'later' if later_s > 0.0 else 'earlier'}"
+        found = (f"{rows} rows of {one.kind.name} whose offsets follow one another as there, "
+                 f"stamped {when if abs(later_s) < _DAY_S else 'from another start'}")  # fmt: skip
+        raise refused(Path(one.files[0]), f"the same session as in {other.files[0]}",
+                      found=found, hint=_HINT)  # fmt: skip
+
+
+def _elsewhere(one: ClockSeries, other: ClockSeries) -> tuple[int, float]:
+    """How many rows of one log another one holds at other stamps, and by how much later [s]."""
+    own, others = one.offset_s, other.offset_s
+    coarser = max(_resolution(own[np.isfinite(own)]), _resolution(others[np.isfinite(others)]))
+    least = 0.51 * coarser + _FINEST_S
+    for sign in (1.0, -1.0):
+        for moved in _places(own, sign * others, least):
+            first, last = max(0, -moved), min(len(one), len(other) - moved)
+            there = slice(first + moved, last + moved)
+            near = np.abs(own[first:last] - sign * others[there]) <= least
+            later = one.time_s[first:last] - other.time_s[there]
+            later_s, step = float(np.median(later)), float(np.median(np.diff(one.time_s)))
+            near &= np.abs(later - later_s) <= 0.5 * step
+            if float(np.mean(near)) > _ROUNDED and abs(later_s) > _SAME_STAMP * step:
+                return int(np.sum(near)), later_s
+    return 0, 0.0
+
+
+def _places(own: Array, others: Array, least: float) -> Iterator[int]:
+    """By how many rows others' offsets come later, where some of one's follow one another there."""
+    for share in _STARTS:
+        begin = int(share * own.shape[0])
+        probe = own[begin : begin + _PROBE]
+        if probe.shape[0] < _PROBE or np.unique(np.round(np.diff(probe) / least)).size < _LEVELS:
+            continue
+        at = np.arange(others.shape[0] - _PROBE + 1)
+        for k, value in enumerate(probe):
+            at = at[np.abs(others[at + k] - value) <= least]
+        yield from (int(where) - begin for where in at[:1])
 
 
 def _apart(one: ClockSeries, other: ClockSeries) -> bool:

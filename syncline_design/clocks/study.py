@@ -39,11 +39,12 @@ from syncline_design.clocks.tolerance import (
 )
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration, percent, to_digits
+from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
 
 MOST_EVENTS: Final = 1000
 MOST_BINS: Final = 1500
 MOST_SESSIONS: Final = 20_000
+APART: Final = 3.0  # times the next largest session, from which one alone makes a bound wide
 LONG_ENOUGH: Final = 10.0  # times what a session remembers
 VALUES: Final = 999  # quantiles that stand for the distribution in a catalog
 _HOLDOVERS_S: Final = (60.0, 600.0, 3600.0, 14400.0)
@@ -336,9 +337,8 @@ def _notes(
     largest = float(np.max(figures.quantiles, initial=0.0))
     if figures.statistical_s is not None and figures.statistical_s > 3.0 * largest > 0.0:
         times = figures.statistical_s / largest
-        said.append(
-            f"the bound is {to_digits(times, 3)} times the largest session: more would narrow it"
-        )
+        said.append(f"the bound is {to_digits(times, 3)} times the largest session: more would "
+                    f"narrow it{_stands_apart(sessions, figures.quantiles)}")  # fmt: skip
     lengths = [s.duration_s for s in sessions if s.is_counted]
     if lengths and max(lengths) > 2.0 * min(lengths):
         said.append(f"sessions of {format_duration(min(lengths))} to "
@@ -350,6 +350,18 @@ def _notes(
     if figures.hard_s is None and figures.bound_s is not None:
         said.append("no hard bound: these logs hold no dispersions or delays")
     return said
+
+
+def _stands_apart(sessions: Sequence[ClockSession], quantiles: Array) -> str:
+    """Which session of a few makes the bound wide, where one is far beyond all others."""
+    order = np.argsort(quantiles)
+    if quantiles.shape[0] < 2 or quantiles[order[-1]] <= APART * quantiles[order[-2]]:
+        return ""
+    one = [s for s in sessions if s.is_counted][int(order[-1])].series
+    begin = moment(float(one.time_s[0]), one.kind.stamps)
+    sizes = [format_duration(rounded(float(quantiles[k]), 3)) for k in (order[-1], order[-2])]
+    return (f"; the session from {begin} alone makes it so wide ({sizes[0]}, the others "
+            f"{sizes[1]} at most): see what happened there")  # fmt: skip
 
 
 def _overlap(sessions: Sequence[ClockSession]) -> bool:

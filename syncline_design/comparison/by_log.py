@@ -32,6 +32,7 @@ from syncline_design.comparison.departing import (
 )
 from syncline_design.comparison.in_doubt import InDoubt, OneWay, likeliest
 from syncline_design.comparison.judgement import Judgement
+from syncline_design.comparison.late_together import others_late
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
@@ -82,11 +83,12 @@ class LogEvidence:
     @property
     def parts(self) -> InStretches:
         """What it says of stretches, and of departures that undo one another."""
-        duration_s = self.found.log.duration_s
+        read = self.found.log
         if self.sight is None:
-            return InStretches(self.paper, self.is_of, duration_s)
+            return InStretches(self.paper, self.is_of, read.duration_s)
         seen = self.sight
-        return InStretches(self.paper, self.is_of, duration_s, seen.stretches, seen.open)
+        return InStretches(self.paper, self.is_of, read.duration_s, seen.stretches, seen.open,
+                           read.kind)  # fmt: skip
 
     def others_of(self, finding: Finding) -> tuple[tuple[str, str, str], ...]:
         """What together would do in a finding's place: effect, sensor and stage of each."""
@@ -113,6 +115,7 @@ class LogEvidence:
                 ways.append(OneWay(tuple(of_joint(one, each.figures) for one in each.others)))
         if any(e not in registry() for way in ways for e in way.effects):
             return None
+        ways += others_late(of_finding(finding), self.paper.case, self.found.log.kind)
         if self._comes_and_goes(finding):
             ways = [way for way in ways if all(registry()[e].passing for e in way.effects)]
         if len(ways) < 2:

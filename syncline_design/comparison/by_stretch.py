@@ -11,6 +11,7 @@ from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.departing import amount, figure_of, of_stretch
 from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.comparison.judgement import Judgement
+from syncline_design.comparison.late_together import others_late
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.result import Smallest
 from syncline_design.diagnosis.stretches import OtherFit, ShownSize, Stands, Stretches
@@ -29,7 +30,8 @@ IsOf = Callable[[str, tuple[str, ...], str, Assumed], bool]
 class InStretches:
     """What stands out in stretches of a log or would have, and what it leaves open.
 
-    duration_s: of the log.  is_of: whether an effect of sensors of a stage breaks an assumption.
+    duration_s, kind: of the log.  is_of: whether an effect of sensors of a stage breaks an
+    assumption.
     """
 
     paper: OnPaper
@@ -37,6 +39,7 @@ class InStretches:
     duration_s: float
     found: Stretches = field(default_factory=Stretches)
     open: tuple[LeftOpen, ...] = ()
+    kind: str = ""
 
     def standing(self, one: Assumed) -> Judgement | None:
         """What stands out and turns the verdict: of this assumption, or perhaps of it."""
@@ -50,20 +53,26 @@ class InStretches:
             turning = all(
                 self.paper.turned(f.label[0], f.label[1], f.stage, _values(f)) for f in fits
             )
-            if s.sure and len(fits) > 1 and turning:
-                ways = tuple(OneWay((of_stretch(fit),)) for fit in fits)
+            ways = (*(OneWay((of_stretch(fit),)) for fit in fits), *self._together(s))
+            if s.sure and len(ways) > 1 and turning:
                 said = f"{of_stretch(s).words} stands out {_placed(s)}"
                 yield InDoubt(said, ways, s.from_s, s.to_s)
+
+    def _together(self, s: Stands) -> list[OneWay]:
+        return list(others_late(of_stretch(s), self.paper.case, self.kind))
 
     def _of(self, s: Stands, one: Assumed) -> Judgement | None:
         name, sensor, _ = s.label
         own = self.is_of(name, (sensor,), s.stage, one)
+        others = [part for way in self._together(s) for part in way.parts]
         also = any(self.is_of(f.label[0], (f.label[1],), f.stage, one) for f in s.instead)
+        also = also or any(self.is_of(p.effect, p.sensors, p.stage, one) for p in others)
         if not (own or also) or not self.paper.turned(name, sensor, s.stage, _values(s)):
             return None
         place = _placed(s)
         rivals = _in_its_place(s)
         alone = all(self.is_of(f.label[0], (f.label[1],), f.stage, one) for f in rivals)
+        alone = alone and not others
         if own and s.sure and alone:
             part = of_stretch(s)
             words = f"{part.words} stands out {place}, and would turn the verdict{_built_in(s)}"

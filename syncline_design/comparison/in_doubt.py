@@ -17,10 +17,15 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 @dataclass(frozen=True, slots=True)
 class OneWay:
-    """Departures that together are one explanation; probability: its odds among the others."""
+    """Departures that together are one explanation; probability: its odds among the others.
+
+    together: whether all other sensors are late by as much as the one that was named is early,
+    which no drive over ground that stands still tells from it.
+    """
 
     parts: tuple[Departing, ...]
     probability: float | None = None
+    together: bool = False
 
     @property
     def words(self) -> str:

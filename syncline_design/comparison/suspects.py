@@ -109,9 +109,9 @@ def _departure(part: Departing, rows_of: RowsOf) -> SuspectedDeparture:
 
 
 def _rank(name: str, ways: Sequence[OneWay], rows_of: RowsOf) -> tuple[float, int]:
-    """The likelier first, of those alike what is met more often."""
+    """The likelier first, of those alike what is met more often: late data before early ones."""
     own = [(way, p) for way in ways for p in way.parts if name in rows_of(p)]
-    likely = max(way.probability or 0.0 for way, _ in own)
+    likely = max(1.0 if way.together else way.probability or 0.0 for way, _ in own)
     return -round(likely, 2), min(registry()[part.effect].rarity for _, part in own)
 
 
@@ -131,7 +131,7 @@ def _command(
 
 
 def _parts_of(name: str, ways: Sequence[OneWay], rows_of: RowsOf) -> Iterator[Departing]:
-    for way in sorted(ways, key=lambda one: len(one.parts)):
+    for way in sorted((w for w in ways if not w.together), key=lambda one: len(one.parts)):
         for part in way.parts:
             if name in rows_of(part) and registry()[part.effect].sensitivity is not None:
                 yield part
