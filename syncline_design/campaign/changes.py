@@ -35,6 +35,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
 from syncline_design.campaign.scatter import (
@@ -51,9 +52,6 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
 EARLY: Final = 10.0  # runs after which a change is met half as often as at the first
-PLAUSIBLE: Final = 2.0  # standard deviations within which a constant is that no run shows
-SHOWN_NATS: Final = 2.0  # beyond one a parameter, from which runs show a constant
-MOST_SHOWN: Final = 8
 SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
 MOST_SCATTERED: Final = 2
 
@@ -338,30 +336,12 @@ class Changes:
     def _total(self, look: int, normal: Array, score: Array) -> Array:
         """Information of runs together, with the prior of what they show."""
         total = normal.sum(axis=0)
-        prior = np.diag(total) / PLAUSIBLE**2
-        for c in self._shown(total, score.sum(axis=0), self._inside(look)):
-            prior[self.terms[c].index] = 0.0
-        found: Array = total + np.diag(np.maximum(prior, self.prior))
-        return found
-
-    def _shown(self, total: Array, score: Array, inside: Array) -> list[int]:
-        """Effects that runs together show as constants: forward, the one that gains most first."""
-        found: list[int] = []
-        while len(found) < MOST_SHOWN:
-            gains = np.zeros(len(self.terms))
-            for group in self.groups:
-                own = np.einsum("ga,gab,gb->g", score[group.index],
-                                inverted(total[group.blocks]), score[group.index])  # fmt: skip
-                gains[group.terms] = 0.5 * own / inside[group.terms] - group.index.shape[1]
-            gains[found] = 0.0
-            best = int(np.argmax(gains))
-            if gains[best] < SHOWN_NATS:
-                break
-            found.append(best)
-            index = self.terms[best].index
-            inverse = inverted(total[np.ix_(index, index)])
-            score = score - total[:, index] @ inverse @ score[index]
-            total = total - total[:, index] @ inverse @ total[index]
+        prior, held = np.diag(total) / PLAUSIBLE**2, np.zeros_like(total)
+        groups = tuple((g.terms, g.index) for g in self.groups)
+        for one in shown_constants(total, score.sum(axis=0), groups, self._inside(look)):
+            prior[one.index] = 0.0
+            held[np.ix_(one.index, one.index)] = one.prior
+        found: Array = total + held + np.diag(np.maximum(prior, self.prior))
         return found
 
     def without(self, one: Change) -> Changes:
