@@ -78,6 +78,48 @@ def test_a_delay_of_one_device_is_undone_to_the_second_order(
         assert _rms(wrong.error((one,))) > 4.0 * left
 
 
+def of_its_antenna(log: WorldLog, late_s: float) -> WorldLog:
+    """The same with the slope of the antenna's true path, by central differences, as velocities."""
+    path, arm_m = log.run.carriers[0].path, log.run.carriers[0].sensors.antenna_arm_m
+
+    def place(time_s: Array) -> Array:
+        return path.position(time_s) + path.rotation(time_s).apply(arm_m)
+
+    time_s, half_s = log.columns["time_s"] - late_s, 1e-3
+    slope = (place(time_s + half_s) - place(time_s - half_s)) / (2.0 * half_s)
+    names = [f"velocity_{axis}_mps" for axis in ("north", "east", "down")]
+    return replace(log, columns=log.columns | dict(zip(names, slope.T, strict=True)))
+
+
+@pytest.mark.parametrize("platform", ["multirotor_lines", "vessel_figure_eights"])
+@pytest.mark.parametrize("seed", range(3))
+def test_velocities_of_the_antenna_are_told_from_those_of_the_vehicle(
+    platform: str, seed: int, tmp_path: Path
+) -> None:
+    """Of a receiver 60 ms late, places and velocities alike: nothing is of another clock."""
+    run = scenario(platform, 20 + seed, 120.0, 5.0)
+    late = (hidden("latency", "position", latency_s=LATE_S),)
+    whole = make_log(run, late, shared_stamps=True)
+    for log, antenna in ((whole, False), (of_its_antenna(whole, LATE_S), True)):
+        view = seen(log, tmp_path)
+        said = [note for note in view.log.notes if "its antenna's" in note]
+        assert len(said) == antenna
+        assert not [note for note in view.log.notes if "another clock" in note]
+        assert view.log.stages[0].velocity_of_position
+        truth = run.carriers[0].path.velocity(log.columns["time_s"] - LATE_S)
+        assert _rms(view.log.stages[0].velocity_mps - truth) < 0.05
+
+
+@pytest.mark.parametrize("forward_m", [0.4, -0.4])
+def test_an_arm_that_is_off_is_no_lag_of_the_velocities(forward_m: float, tmp_path: Path) -> None:
+    """In a turn the antenna ahead of where it is taken to be passes every place earlier."""
+    run = scenario("multirotor_lines", 5, 120.0, 5.0)
+    off = (hidden("lever_arm", "position", x_m=forward_m, y_m=0.0, z_m=0.0),)
+    view = seen(make_log(run, off, shared_stamps=True), tmp_path)
+    assert not [note for note in view.log.notes if "another clock" in note]
+    assert view.log.stages[0].velocity_of_position
+
+
 def _rms(error: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
 

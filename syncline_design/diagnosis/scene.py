@@ -133,11 +133,14 @@ def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
 def _of_the_reference_point(
     log: Log, logged: StageLog, rotation: Array, antenna: Array
 ) -> StageLog:
-    """The stage with the velocity of its reference point, v = v_A - R (w x l_G).
+    """Slopes of the antenna's places hold the sweep of its arm, which is added where a delay is
+    felt."""
+    return less_sweep(log, logged, rotation, antenna) if logged.follows_position else logged
 
-    Slopes of the antenna's places hold the sweep of its arm, which is added where a delay is felt.
-    """
-    if not logged.follows_position or not np.any(antenna):
+
+def less_sweep(log: Log, logged: StageLog, rotation: Array, antenna: Array) -> StageLog:
+    """The stage with the velocity of its reference point, v = v_A - R (w x l_G)."""
+    if not np.any(antenna):
         return logged
     sweep = rotate(rotation, np.cross(logged.rate_radps, antenna))
     track = logged.velocity_track
