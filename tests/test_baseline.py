@@ -23,6 +23,7 @@ FAILING = (ROOT / "specs" / "usv_wire_missing.yaml").read_text(encoding="utf-8")
 # 447.4 mm of 250 mm, tau / tau_crit 1.734 of 1, 33 357.35 EUR of 36 000 EUR
 ACCURACY, COST = "limit: 0.25 m", "limit: 36000 EUR"
 OPEN = (ROOT / "specs" / "infeasible_example.yaml").read_text(encoding="utf-8")
+SYNC = ("kind: sync, limit: 1.0", "kind: sync, limit: 0.000001")  # no stamps are so good
 PLAIN = CheckSettings(monte_carlo=False)
 
 
@@ -97,6 +98,14 @@ CASES = {
         {"M": "gone"},
     ),
     "infeasible before and now": (OPEN, OPEN, 0, {}),
+    "one more cannot be met": (OPEN, changed(OPEN, SYNC), 1, {"SYNC-1": "worse"}),
+    "one less cannot be met": (changed(OPEN, SYNC), OPEN, 0, {"SYNC-1": "better"}),
+    "cannot be met, and limited further": (
+        OPEN,
+        changed(OPEN, ("limit: 5 cm", "limit: 1 cm")),
+        1,
+        {"ACC-1": "worse"},
+    ),
     "infeasible now": (FAILING, OPEN, 1, {}),
     "infeasible before": (OPEN, FAILING, 0, {}),
     "a waiver goes": (

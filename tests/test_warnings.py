@@ -247,6 +247,8 @@ def test_console_and_csv_tell_a_waived_requirement_from_a_failed_one(
         x for x in console(on_verdict(found), colour=False).splitlines() if x.startswith("  NEAR  ")
     ]
     assert line.split()[1:3] == state.split()
+    headline = console(on_verdict(found), colour=False).splitlines()[0]
+    assert ("Meets every requirement, NEAR waived" in headline) is (state == "\u25d0 waived")
     rows = {row["requirement"]: row for row in csv.DictReader(io.StringIO(csv_of(found)))}
     assert rows["NEAR"]["status"] == ("pass" if limit_m > 1.0 else "fail")
     assert rows["NEAR"]["waiver"] == said

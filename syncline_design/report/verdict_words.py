@@ -41,11 +41,16 @@ def larger(entries: Sequence[LedgerRow]) -> list[LedgerRow]:
 def outcome(verdict: Checked) -> Outcome:
     """The verdict's outcome.
 
-    A design that meets while a larger figure of its own does not says so in the same breath.
+    A design that meets while a larger figure of its own does not, or while a miss is waived, says
+    so in the same breath.
     """
     found = OUTCOMES[verdict.verdict]
     if verdict.verdict == "refused":
         return found
+    rows = verdict.requirements if verdict.verdict == "meets" else ()
+    if missed := [visible(row.id) for row in rows if row.status == "fail"]:
+        word = f"{found.word}, {sentence_list(missed)} waived"
+        found = replace(STATUSES["waived"], word=word)
     return replace(found, word=found.word + qualification(verdict))
 
 

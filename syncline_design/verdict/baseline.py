@@ -1,8 +1,9 @@
 """A verdict against an earlier one of the same spec: only what got worse fails.
 
 Worse is: a requirement passed and no longer does, or was open and fails; it fails by more (value
-over limit, of a simulated one where the two intervals do not meet); it is new and does not pass; or
-the verdict as a whole fell from `meets` to `indeterminate`, `fails`, `infeasible`.
+over limit, of a simulated one where the two intervals do not meet; of two verdicts without a
+design, by a lower limit); it is new and does not pass; or the verdict as a whole fell from `meets`
+to `indeterminate`, `fails`, `infeasible`.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
         if was is None:
             change: SinceBaseline = "new"
         elif None in (verdict.design, before.design):
-            change = _without_design(verdict, before, row)
+            change = _without_design(verdict, before, row, was)
         else:
             change = _since(row, was)
         yield RequirementSince(row.id, change, None if was is None else _earlier(was))
@@ -66,11 +67,21 @@ def _earlier(row: RequirementResult) -> Earlier:
     return Earlier(row.status, row.value, row.limit, row.unit, row.limit_written)
 
 
-def _without_design(verdict: Verdict, before: Verdict, row: RequirementResult) -> SinceBaseline:
-    """Where one side has no design its rows have no figures: the verdict as a whole decides."""
-    if row.status == "pass" or verdict.verdict == before.verdict:
+def _without_design(
+    verdict: Verdict, before: Verdict, row: RequirementResult, was: RequirementResult
+) -> SinceBaseline:
+    """Where one side has no design its rows have no figures: the verdict as a whole decides.
+
+    Where neither has one, whether the requirement is a part of what cannot be met; then its limit.
+    """
+    if row.status == "pass":
         return "same"
-    return "worse" if _fell(verdict, before) else "better"
+    if verdict.verdict != before.verdict:
+        return "worse" if _fell(verdict, before) else "better"
+    step = _standing(row) - _standing(was)
+    if step == 0 and row.status == "fail" and row.unit == was.unit:
+        step = (row.limit < was.limit) - (row.limit > was.limit)
+    return _word(step)
 
 
 def _fell(verdict: Verdict, before: Verdict) -> bool:
@@ -81,6 +92,10 @@ def _since(now: RequirementResult, then: RequirementResult) -> SinceBaseline:
     step = _standing(now) - _standing(then)
     if step == 0 and now.status == "fail" and now.unit == then.unit:
         step = _further(now, then) - _further(then, now)
+    return _word(step)
+
+
+def _word(step: int) -> SinceBaseline:
     return "same" if step == 0 else "worse" if step > 0 else "better"
 
 
