@@ -19,8 +19,8 @@ import report_samples as samples
 from html_page import Page
 from syncline_design.machine.records import Record
 from syncline_design.paper.errata import ERRATA
-from syncline_design.report import charts, errata
-from syncline_design.report.document import Document, Outcome, section, show
+from syncline_design.report import charts, errata, verdict_charts
+from syncline_design.report.document import Document, Explorer, Outcome, section, show
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
@@ -378,3 +378,25 @@ def test_tables_that_a_tablet_has_no_room_for_are_told() -> None:
         part = section("part", "Part", show(one))
         page = html(Document("x", Outcome("good", "x", "x"), "x", (), (), tuple(part)))
         assert ('class="scroll cards wide' in page) is wide
+
+
+@pytest.mark.parametrize(("old", "new", "word"), [
+    ("limit: 50 cm", "limit: 50 cm", "meets"),
+    ("limit: 50 cm", "limit: 5 cm", "fails"),
+    ("sync, limit: 1.0", "sync, limit: 0.00005", "fails"),  # 6.3e-5 of one sensor, 3.2e-5 of all
+    ("sync, limit: 1.0", "sync, limit: 0.00007", "meets"),
+    ("limit: 0.30 m", "limit: 0.01 m", "fails"),  # simulated
+])  # fmt: skip
+def test_the_sliders_begin_with_the_verdict(old: str, new: str, word: str) -> None:
+    """`would meet` stood below a verdict that one sensor's timestamps, or the simulation, fails."""
+    text = samples.PINNED.replace("limit: 5 cm", "limit: 50 cm")
+    assert old in text
+    verdict = samples.checked(text.replace(old, new))
+    assert verdict.verdict == word
+    (node,) = verdict_charts.explorer(verdict)
+    assert isinstance(node, Explorer)
+    assert node.limit is not None
+    accurate = node.floor_m + node.rate_mps * node.tau_s <= node.limit.limit_m
+    crit = math.inf if node.tau_crit_s is None else node.tau_crit_s
+    met = accurate and node.tau_s < node.sync_limit * crit and node.others_pass
+    assert met is (word == "meets")

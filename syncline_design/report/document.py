@@ -120,7 +120,10 @@ class ExploredLimit:
 
 @dataclass(frozen=True, slots=True)
 class Explorer:
-    """Sliders that move tau and the limit of the chart so named; None where unknown."""
+    """Sliders that move tau and the limit of the chart so named; None where unknown.
+
+    tau_crit_s: the system's tau at which the first sensor reaches its own tau_crit.
+    """
 
     kind: ClassVar = "explorer"
     chart: str

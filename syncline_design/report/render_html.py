@@ -131,8 +131,9 @@ def _is_wide(shown: Table) -> bool:
     needed = 0
     for column, head in enumerate(shown.heads):
         longest = max((len(row[column].text) for row in shown.rows), default=0)
+        words = [head.text] if head.numeric else head.text.split()  # heads of figures stay whole
         longest = longest if head.numeric else min(longest, _LINE)
-        needed += 2 + max(longest, *(len(word) for word in head.text.split() or [""]))
+        needed += 2 + max(longest, *(2 + len(word) for word in words or [""]))  # with its arrow
     return needed > _TABLET
 
 

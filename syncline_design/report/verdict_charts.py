@@ -78,14 +78,17 @@ def _floor_m(syncline: SynclineFigures) -> float:
 
 
 def explorer(verdict: Verdict) -> list[Node]:
-    """Values for the sliders; the total follows the model that decides, in proportion to tau."""
+    """Values for the sliders; the total follows the model that decides, in proportion to tau.
+
+    So does each sensor's share of its own tau_crit, of which the requirement holds the largest.
+    """
     syncline = verdict.syncline
     if syncline is None or not syncline.sensor_error_m or not syncline.tau_s:
         return []
     floor, tau, total = _floor_m(syncline), syncline.tau_s, syncline.total_m
     crit, limit = syncline.tau_crit_s, tightest_limit(verdict, "accuracy")
-    simulated = ("accuracy", "sync", "monte_carlo")
-    fixed = [row for row in verdict.requirements if row.kind not in simulated]
+    fixed = [row for row in verdict.requirements if row.kind not in ("accuracy", "sync")]
+    sync = tightest_limit(verdict, "sync")
     centre, middle = crit or tau, total if limit is None else limit.limit
     return [
         Explorer(
@@ -93,9 +96,9 @@ def explorer(verdict: Verdict) -> list[Node]:
             floor_m=floor,
             rate_mps=(total - floor) / tau,
             tau_s=tau,
-            tau_crit_s=crit,
+            tau_crit_s=crit if sync is None or not sync.value else tau / sync.value,
             limit=None if limit is None else explored(limit),
-            sync_limit=lowest_limit(verdict, "sync") or 1.0,
+            sync_limit=1.0 if sync is None else sync.limit,
             others_pass=all(verdict_words.status_of(r).word in ("pass", "waived") for r in fixed),
             tau_span=(min(centre / 1e3, tau / 2), max(centre * 1e2, tau * 2)),
             limit_span=(min(middle, floor) / 4, max(middle, total) * 10),
