@@ -22,6 +22,11 @@ FLAWS = """(width) => {
       if (box.width < 90 && box.height > 190) flaws.push('squeezed: ' + cell.innerText);
     });
   });
+  document.querySelectorAll('h3').forEach(head => {
+    const next = head.nextElementSibling;
+    if (seen(head) && !(next && (next.innerText.trim() || next.querySelector('svg'))))
+      flaws.push('nothing below ' + head.innerText);
+  });
   document.querySelectorAll('figure svg').forEach(svg => {
     if (!seen(svg)) return;
     const name = svg.querySelector('title').textContent, frame = svg.getBoundingClientRect();

@@ -96,9 +96,9 @@ def _proposal(result: LogInspection) -> list[Node]:
     ]  # fmt: skip
     nodes: list[Node] = [
         *show(table("Which stream plays which part", ("Part", "Stream", "Sure", "Why"), rows)),
-        Heading("For the spec"),
-        Text(code(proposal.block)),
     ]
+    if proposal.block:
+        nodes += [Heading("For the spec"), Text(code(proposal.block))]
     if proposal.conversions:
         words = tuple(given(one) for one in proposal.conversions)
         nodes += [Heading("What is done to the values"), Items(words)]

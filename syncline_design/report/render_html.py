@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _TEMPLATES: Final = "syncline_design.templates"
 MOST_VALUES: Final = 200  # rows of the table below a figure; more are shown one by one
 _LINE: Final = 30  # characters of a column that holds sentences
-_TABLET: Final = 100  # characters in a line of a table there
+_TABLET: Final = 92  # characters in a line of a table there
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 
 
