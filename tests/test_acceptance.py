@@ -171,10 +171,16 @@ def judged(case: Case, found: Diagnosis) -> Iterator[tuple[tuple[str, str], Judg
         yield (one.role, one.name), by_log(one, log)
 
 
-def test_a_log_that_is_not_explained_shows_nothing(known: tuple[Case, Diagnosis]) -> None:
-    case, found = known
-    unexplained = dict(judged(case, replace(found, verdict="unexplained")))
+def test_a_log_that_is_not_explained_shows_nothing(
+    known: tuple[Case, Diagnosis], found: Diagnosis
+) -> None:
+    case, right = known
+    unexplained = dict(judged(case, replace(right, verdict="unexplained")))
     assert {one.status for key, one in unexplained.items() if key[0] != "platform"} == {"not_shown"}
+    (late,) = [f for f in found.findings if f.effect == "latency"]
+    near = replace(found, verdict="unexplained", findings=(replace(late, kind="stand_in"),))
+    words = dict(judged(case, near))["attitude", "latency"].words
+    assert f"the nearest word for it: {late.sentence}" in words
 
 
 def test_a_blind_log_shows_only_what_it_is_not_blind_to(known: tuple[Case, Diagnosis]) -> None:

@@ -383,7 +383,9 @@ def _doubt(one: Assumed, log: LogEvidence) -> str:
         first = next(c for c in found.checks if c.severity == "contradiction")
         return f"the log contradicts itself or the spec: {first.message}"
     if found.verdict == "unexplained":
-        return "the log disagrees with the spec and the cause has no name: nothing is shown"
+        near = "; ".join(f.sentence for f in found.findings if f.material and f.kind == "stand_in")
+        near = f" (the nearest word for it: {near})" if near else ""
+        return f"the log disagrees with the spec and the cause has no name{near}: nothing is shown"
     for finding in found.findings:
         if finding.material and finding.effect not in registry():
             return f"the log holds what has no cause by name: {finding.sentence}"
