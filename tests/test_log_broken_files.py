@@ -78,6 +78,8 @@ CASES: dict[str, tuple[bytes | Callable[[Path], Path], int | str]] = {
     "pos/cut.pos": (SOLUTION[:-60], 39),
     "pos/column-lost.pos": (LOST, "10 fields among"),
     "pos/month-13.pos": (swapped(SOLUTION, b"07/11 06:04:09", b"13/11 06:04:09"), "no epoch"),
+    "pos/year-1.pos": (SOLUTION.replace(b"2023/07", b"0001/07"), 40),
+    "pos/year-9999.pos": (SOLUTION.replace(b"2023/07", b"9999/07"), 40),
     "pos/beyond-the-pole.pos": (swapped(SOLUTION, b"35.1653", b"95.1653"), "no place on earth"),
     "pos/header-alone.pos": ((HEIGHTS + TITLE).encode(), "no epoch in the solution"),
     "pos/a-line-of-1-MB.pos": (SOLUTION + b"1 " * 2**19, "a line longer"),
@@ -154,7 +156,8 @@ def test_a_broken_file_ends_as_said(tmp_path: Path, name: str) -> None:
     streams = recording.streams()
     assert sum(s.messages for s in streams if s.name != "fix") == outcome
     whole = name in ("nmea/time-of-25-hours.log", "ubx/payload-too-short.ubx",
-                     "las/chunks-of-4-billion.laz")  # fmt: skip
+                     "las/chunks-of-4-billion.laz", "pos/year-1.pos",
+                     "pos/year-9999.pos")  # fmt: skip
     assert (recording.incomplete is None) == whole
     assert all(stream.partial != whole for stream in streams)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
 from syncline_design.logs.readers.decimal_stamps import nanoseconds
-from syncline_design.logs.readers.epochs import DAY_NS, NANO, WEEK_NS, week_start_ns
+from syncline_design.logs.readers.epochs import DAY_NS, NANO, WEEK_NS, held, week_start_ns
 from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import Frame, Recording, Timeline
 from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
@@ -150,7 +150,7 @@ class PosRecording(BatchRecording):
         seconds = int(time[1]) * 3600 + int(time[2]) * 60 + int(time[3])
         rest = nanoseconds("0" + (time[4] or ".0"))
         shift = JST_NS if self._header.system == "JST" else 0
-        return days * DAY_NS + seconds * NANO + rest - shift
+        return held(days * DAY_NS + seconds * NANO + rest - shift)
 
     def _possible(self, place: Sequence[float]) -> bool:
         if not all(np.isfinite(place)) or max(abs(x) for x in place) > 1e8:
