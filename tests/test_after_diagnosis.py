@@ -17,7 +17,6 @@ from diagnosis_samples import diagnosis
 from syncline_design.cli.app import app
 from syncline_design.comparison.meaning import DesignMeaning, meaning
 from syncline_design.model.figure_text import format_duration
-from syncline_design.report import numbers
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
@@ -151,6 +150,7 @@ def test_a_finding_in_a_spec_reads_as_it_was_found(
 
 
 def test_page_and_markdown_show_all_three_beside_each_other() -> None:
+    """In the unit in which the spec limits the error."""
     found = of("latency", {"latency_s": 0.045})
     data = diagnosis(design=found)
     document = on_diagnosis(data)
@@ -159,7 +159,7 @@ def test_page_and_markdown_show_all_three_beside_each_other() -> None:
         for one in found.figures:
             assert one.label.split(",")[0] in rows
             for value in (one.before_m, one.after_m):
-                assert numbers.length(value).replace("\u00a0", " ") in rows
+                assert f"{value:.4g} m" in rows
         assert "Horizon: 1 h" in rows
 
 
