@@ -136,7 +136,7 @@ class TextSource:
             frame = delimited.parsed(block, self.how, [place], as_text=True)
             return trimmed(frame.to_series(0))
         except BadCellError as bad:
-            raise self._bad(block, place, bad) from None
+            raise text_among_numbers(self.path, block, place, self.header[place], bad) from None
         except pl.exceptions.PolarsError as error:
             found = (str(error).splitlines() or [type(error).__name__])[0][:160]
             raise refuse(self.path, "no readable CSV file", found=found) from None
@@ -148,7 +148,7 @@ class TextSource:
                 row = int(text.str.contains(mark, literal=True).arg_max() or 0)
                 raise BadCellError(row, str(text[row]), ONE_MARK)
         except BadCellError as bad:
-            raise self._bad(block, place, bad) from None
+            raise text_among_numbers(self.path, block, place, self.header[place], bad) from None
         self._mark = self._mark or mark
         return values
 
@@ -160,20 +160,24 @@ class TextSource:
             if zoned is not None and zone is not None and zone != zoned:
                 raise BadCellError(0, str(text[0]), ONE_ZONE)
         except BadCellError as bad:
-            raise self._bad(block, place, bad) from None
+            raise text_among_numbers(self.path, block, place, self.header[place], bad) from None
         return stamps, zone
 
-    def _bad(self, block: delimited.RowBlock, place: int, bad: BadCellError) -> BadInput:
-        return refuse(
-            self.path,
-            "text among numbers",
-            line=int(block.lines[bad.row]),
-            column=place + 1,
-            field=self.header[place],
-            expected=bad.expected,
-            found=repr(bad.text[:40]),
-            hint=bad.hint,
-        )
+
+def text_among_numbers(
+    path: Path, block: delimited.RowBlock, place: int, field: str, bad: BadCellError
+) -> BadInput:
+    """The error for a cell of a block's column that does not hold what the column holds."""
+    return refuse(
+        path,
+        "text among numbers",
+        line=int(block.lines[bad.row]),
+        column=place + 1,
+        field=field,
+        expected=bad.expected,
+        found=repr(bad.text[:40]),
+        hint=bad.hint,
+    )
 
 
 def _torn(cell: str) -> bool:

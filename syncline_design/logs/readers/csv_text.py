@@ -28,7 +28,7 @@ from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, T
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.sources import demand_plain_file
-from syncline_design.logs.text_source import TextSource
+from syncline_design.logs.text_source import TextSource, text_among_numbers
 
 if TYPE_CHECKING:
     import polars as pl
@@ -198,16 +198,7 @@ class CsvRecording(BatchRecording):
             raise refuse(self.path, "no readable CSV file", found=found) from None
 
     def _bad(self, block: delimited.RowBlock, place: int, bad: BadCellError) -> Exception:
-        return refuse(
-            self.path,
-            "text among numbers",
-            line=int(block.lines[bad.row]),
-            column=place + 1,
-            field=self._names[place],
-            expected=bad.expected,
-            found=repr(bad.text[:40]),
-            hint=bad.hint,
-        )
+        return text_among_numbers(self.path, block, place, self._names[place], bad)
 
     def _facts(self, name: str) -> StreamFacts:
         layout: Layout = self._layout
