@@ -53,9 +53,8 @@ def choice_of(
     brief: the front, and nothing besides.
     """
     # late: 20 ms that a pinned spec need not wait
-    from syncline_design.choice.decide import best
     from syncline_design.choice.front import front, staircase
-    from syncline_design.verdict.alternatives import alternatives, bargains
+    from syncline_design.verdict.alternatives import bargains
     from syncline_design.verdict.front_by_figure import front_by_figure
 
     assert picked.verified is not None
@@ -63,19 +62,11 @@ def choice_of(
     pieces = pieces or Pieces()
     nothing: tuple[FrontPoint, ...] = ()
 
-    def next_best(every: bool) -> Iterator[Design]:
-        return (d for d in best(problem, NEXT_BEST + 1, every=every) if d != chosen)
-
     if points is None:
         points = pieces.made("front", lambda: tuple(front(problem)), nothing)
     if brief:
         return ChoiceResult(picked.choice.proof, front_designs(case, problem, points))
-    following = ranked = list[Design]()
-    offered = list[Alternative]()
-    if others:
-        following = pieces.listed("next best designs", lambda: next_best(every=False))
-        ranked = pieces.listed("next best of every design", lambda: next_best(every=True))
-        offered = pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))
+    following, ranked, offered = _others(case, problem, chosen, pieces) if others else ((), (), ())
     excluded, count = ruled_out(problem)
     by_figure = None
     if pictured:
@@ -94,9 +85,26 @@ def choice_of(
         ranked_designs(case, problem, ranked[:NEXT_BEST]),
         excluded,
         count,
-        tuple(offered),
+        offered,
         tuple(bargains(case, problem, chosen, points)),
         by_figure=by_figure,
+    )
+
+
+def _others(
+    case: Case, problem: Problem, chosen: Design, pieces: Pieces
+) -> tuple[Sequence[Design], Sequence[Design], tuple[Alternative, ...]]:
+    """The next best designs, those of every design, and what else could be bought."""
+    from syncline_design.choice.decide import best
+    from syncline_design.verdict.alternatives import alternatives
+
+    def next_best(every: bool) -> Iterator[Design]:
+        return (d for d in best(problem, NEXT_BEST + 1, every=every) if d != chosen)
+
+    return (
+        pieces.listed("next best designs", lambda: next_best(every=False)),
+        pieces.listed("next best of every design", lambda: next_best(every=True)),
+        tuple(pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))),
     )
 
 
