@@ -27,8 +27,9 @@ from syncline_design.comparison.acceptance import (
     MeasuredFigure,
 )
 from syncline_design.comparison.assumptions import Assumed, assumptions
-from syncline_design.comparison.by_log import LogEvidence, by_log
+from syncline_design.comparison.by_log import by_log
 from syncline_design.comparison.judgement import Judgement, together
+from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.consequence import promise_of

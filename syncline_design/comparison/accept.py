@@ -22,11 +22,12 @@ from syncline_design.comparison.acceptance import (
 )
 from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_clock import Resting, by_clock
-from syncline_design.comparison.by_log import LogEvidence, by_log
+from syncline_design.comparison.by_log import by_log
 from syncline_design.comparison.by_stamps import by_stamps
 from syncline_design.comparison.departing import Departing
 from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_files
 from syncline_design.comparison.judgement import Judgement, together
+from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.comparison.stamp_meaning import held_against
 from syncline_design.comparison.suspects import grouped

@@ -66,19 +66,73 @@ class InDoubt:
         return f"it is {mine}, or {others}: this log cannot tell which ({self.found})"
 
 
-def likeliest(figures: Sequence[tuple[float | None, MeasuredFigure | None]]
-              ) -> MeasuredFigure | None:  # fmt: skip
-    """The likeliest figure of a row, with an interval that holds those of all its ways."""
-    known = [(p or 0.0, f) for p, f in figures if f is not None and f.value is not None]
+@dataclass(frozen=True, slots=True)
+class Suspicion:
+    """What a finding in doubt would make of a row: of each way that breaks it its odds and figure.
+
+    in_part: whether it acts in a part of the log alone; two such parts are never the same rows.
+    """
+
+    figures: tuple[tuple[float | None, MeasuredFigure | None], ...]
+    in_part: bool = False
+
+    @property
+    def known(self) -> tuple[tuple[float, MeasuredFigure], ...]:
+        """Those with a figure."""
+        return tuple(
+            (p or 0.0, f) for p, f in self.figures if f is not None and f.value is not None
+        )
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """What holds the intervals of all its ways; None where one has none."""
+        lows = [f.low for _, f in self.known if f.low is not None]
+        highs = [f.high for _, f in self.known if f.high is not None]
+        if min(len(lows), len(highs)) < max(len(self.known), 1):
+            return None
+        return min(lows), max(highs)
+
+
+def likeliest(findings: Sequence[Suspicion], signed: bool) -> MeasuredFigure | None:
+    """The likeliest figure of a row, with an interval that holds whichever of the findings act.
+
+    Those of several findings add where they act together.  signed: of one component; of several
+    the sizes add at most.
+    """
+    known = [each for each in findings if each.known]
     if not known:
         return None
-    _, first = max(known, key=lambda pair: pair[0])
-    lows = [f.low for _, f in known]
-    highs = [f.high for _, f in known]
-    if any(low is None for low in lows) or any(high is None for high in highs):
+    _, first = max((pair for each in known for pair in each.known), key=lambda pair: pair[0])
+    spans = [each.span for each in known]
+    ends = [span for span in spans if span is not None]
+    if len(ends) < len(spans):
         return MeasuredFigure(first.value)
-    return MeasuredFigure(
-        first.value,
-        min(low for low in lows if low is not None),
-        max(high for high in highs if high is not None),
-    )
+    whole = [span for each, span in zip(known, ends, strict=True) if not each.in_part]
+    parts = [span for each, span in zip(known, ends, strict=True) if each.in_part]
+    sums = [_of_some([*whole, *part], signed) for part in ([[p] for p in parts] or [[]])]
+    return MeasuredFigure(first.value, min(low for low, _ in sums), max(high for _, high in sums))
+
+
+def widened_by(
+    figure: MeasuredFigure | None, findings: Sequence[Suspicion], signed: bool
+) -> MeasuredFigure | None:
+    """A figure that is sure, with an interval that holds whichever of the findings act as well."""
+    others = likeliest(findings, signed)
+    if figure is None or others is None or figure.low is None or figure.high is None:
+        return figure
+    if others.low is None or others.high is None:
+        return MeasuredFigure(figure.value)
+    if not signed:
+        return MeasuredFigure(figure.value, max(figure.low - others.high, 0.0),
+                              figure.high + others.high)  # fmt: skip
+    return MeasuredFigure(figure.value, figure.low + min(others.low, 0.0),
+                          figure.high + max(others.high, 0.0))  # fmt: skip
+
+
+def _of_some(spans: Sequence[tuple[float, float]], signed: bool) -> tuple[float, float]:
+    """The ends of the sums over every choice of one or more of the intervals."""
+    lows, highs = zip(*spans, strict=True)
+    if len(spans) > 1 and not signed:
+        return 0.0, sum(highs)
+    below, above = [x for x in lows if x < 0.0], [x for x in highs if x > 0.0]
+    return sum(below) if below else min(lows), sum(above) if above else max(highs)
