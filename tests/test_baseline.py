@@ -166,6 +166,17 @@ def test_the_baseline_of_several_specs_is_found_by_path_then_name(tmp_path: Path
     assert against(elsewhere, [good, other], "all.json").exit_code == 0
 
 
+def test_the_only_verdict_of_a_file_is_no_baseline_of_another_spec(tmp_path: Path) -> None:
+    """Else a foreign file forgives whatever both miss."""
+    named = FAILING.replace("name: ", "name: another ", 1)
+    assert named != FAILING
+    foreign = verdict_of(tmp_path, named, "foreign.yaml")
+    now = against(verdict_of(tmp_path, FAILING), [foreign], "foreign.json")
+    assert now.baseline is not None
+    assert now.baseline.verdict is None
+    assert now.exit_code == 1
+
+
 def run(*words: str | Path) -> tuple[int, str]:
     found = CliRunner().invoke(app, [str(word) for word in words])
     return found.exit_code, found.stdout + found.stderr

@@ -24,6 +24,8 @@ import syncline_design as sd
 from browsing import flaws_of
 from syncline_design.cli.app import app
 from syncline_design.comparison.meaning import DiagnosisAndDesign
+from syncline_design.diagnosis.same_system import description
+from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.records import read_as
 from syncline_design.planning import next_drive
 from syncline_design.planning.drives import whole_drive
@@ -587,6 +589,8 @@ def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
         leg.partition(": ")[2] for leg in drive["legs"]
     ]
     from_file = call(spec, "--diagnosis", result, "-o", "json:-")
+    assert data["system"] == json.loads(json.dumps(description(pinned_system(load(spec)))))
+    assert "cautions" not in json.loads(from_file.stdout)
     pairs = json.loads(from_file.stdout)["pairs"]
     assert pairs[0]["sizes"]["latency_s"] == pytest.approx(0.03, rel=0.1)
     assert all(pair["separated"] for pair in pairs)

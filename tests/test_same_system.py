@@ -9,7 +9,7 @@ from math import radians
 
 import pytest
 
-from syncline_design.campaign.same_system import description, differences
+from syncline_design.diagnosis.same_system import description, differences
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Look, Platform, Sensor, Stage, System
 from syncline_design.model.timing import Normal, TimingError, Uniform
@@ -23,7 +23,8 @@ SLOW = EffectEntry("latency", "attitude", "s", (("latency_s", 0.02),))
 
 
 def told(other: System, kept: System = BUILT) -> list[str]:
-    return list(differences(*(json.loads(json.dumps(description(x))) for x in (kept, other))))
+    both = (json.loads(json.dumps(description(one))) for one in (kept, other))
+    return [one.words("the store") for one in differences(*both)]
 
 
 def with_stage(**changes: object) -> System:

@@ -24,7 +24,7 @@ from syncline_design import __version__
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.packing import PackingError
-from syncline_design.campaign.same_system import description, differences
+from syncline_design.diagnosis.same_system import description, differences
 from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.machine.appended_files import append_line, whole_lines
 from syncline_design.machine.input_files import UnsuitableError, read_plain
@@ -184,7 +184,8 @@ def demand_system(stored: Stored, system: System, spec: str) -> None:
     if found:
         raise refused(
             stored.path,
-            f"a store of another system than {spec}: " + "; ".join(found),
+            f"a store of another system than {spec}: "
+            + "; ".join(one.words("the store") for one in found),
             "",
             1,
             "use a store of its own for every system; a changed name or requirement is none",

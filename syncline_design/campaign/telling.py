@@ -36,9 +36,11 @@ from syncline_design.diagnosis.result import (
     WholeGap,
 )
 from syncline_design.diagnosis.run import provenance_of
+from syncline_design.diagnosis.same_system import description
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.diagnosis.sight import DetectionLimit, alone, informative
 from syncline_design.diagnosis.slow_states import Judged
+from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -108,6 +110,7 @@ def tell(told: Told) -> Diagnosis:
         informative=informative(promise, shown),
         smallest_seen=tuple(one.record for one in shown),
         joint=_joint(told),
+        system=description(pinned_system(told.case)),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from syncline_design.diagnosis.plotted import Plots
 from syncline_design.effects import registry
@@ -504,7 +504,8 @@ class Diagnosis(Record):
     where: the regimes that disagreed most before anything was named.  steps: the gap after each
     addition.  unseen: what this log could not show.  smallest_seen: what it would have shown.
     plan: the drive that would tell, where a finding has aliases.  joint: the logs that were taken
-    together, each as a run of its own.
+    together, each as a run of its own.  system: what it is a diagnosis of
+    (`same_system.description`); None of a system that no spec describes.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -528,6 +529,7 @@ class Diagnosis(Record):
     smallest_seen: tuple[Smallest, ...] = ()
     plan: NextDrive | None = optional()
     joint: Joint | None = optional()
+    system: Mapping[str, Any] | None = optional()
 
     @property
     def exit_code(self) -> int:

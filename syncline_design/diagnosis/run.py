@@ -59,6 +59,7 @@ from syncline_design.diagnosis.result import (
     SlowNoise,
     SpecRead,
 )
+from syncline_design.diagnosis.same_system import description
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.search import (
     DiagnosisSettings,
@@ -72,7 +73,7 @@ from syncline_design.diagnosis.shared_stamps import with_shared_stamps
 from syncline_design.diagnosis.shown_noise import with_shown_noise
 from syncline_design.diagnosis.sight import informative, smallest_seen
 from syncline_design.diagnosis.survey import survey_m
-from syncline_design.diagnosis.system import Measured, measured
+from syncline_design.diagnosis.system import Measured, measured, pinned_system
 from syncline_design.diagnosis.system_delay import with_system_delay
 from syncline_design.diagnosis.unseen_block import unseen_block
 from syncline_design.diagnosis.untouched import untouched_error
@@ -234,6 +235,7 @@ def told(
         provenance=provenance_of(settings, case),
         informative=informative(promise, shown),
         smallest_seen=tuple(one.record for one in shown),
+        system=None if case is None else description(pinned_system(case)),
     )
 
 

@@ -119,6 +119,7 @@ class Plan(Record):
     priors: standard deviations before the drive, SI.  assumed: figures of the platform that the
     spec does not state.  surveyed: whether the targets were there already, and the drive is laid
     beside them.  sized: whether pairs are judged at a size that is known, beyond first order.
+    cautions: where what the plan was given may not be of this system.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -146,6 +147,7 @@ class Plan(Record):
     provenance: PlanProvenance
     flown: Flown | None = optional()
     sized: bool | None = optional()
+    cautions: tuple[str, ...] | None = optional()
 
     @property
     def exit_code(self) -> int:

@@ -21,6 +21,7 @@ from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
 from syncline_design.planning.drives import WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
+from syncline_design.planning.from_diagnosis import cautions_of
 from syncline_design.planning.information import (
     canonical_correlation,
     fisher,
@@ -126,6 +127,7 @@ class Telling:
             ),
             flown=self._flown(),
             sized=bool(self.setup.world.beyond) or None,
+            cautions=self._cautions() or None,
         )
         vehicle = self.setup.world.vehicles[found.stretches[-1].leg.stage]
         others = {
@@ -134,6 +136,10 @@ class Telling:
             if k != found.stretches[-1].leg.stage
         }
         return PlanRun(result, path, target, leg, found.driven, vehicle.motion, others)
+
+    def _cautions(self) -> tuple[str, ...]:
+        found = self.setup.request.diagnosis
+        return () if found is None else cautions_of(self.setup.case, self.setup.system, found)
 
     def _tolerance(self) -> dict[str, float]:
         pairs = zip(self.setup.goal.wanted, self.setup.goal.tolerance, strict=True)

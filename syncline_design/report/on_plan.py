@@ -95,6 +95,7 @@ def _sentences(found: Plan) -> Iterator[str]:
         )
     if found.confused:
         yield f"Left free one at a time, these would take it: {', '.join(found.confused)}."
+    yield from found.cautions or ()
 
 
 def _how_far(found: Plan) -> str:

@@ -23,8 +23,8 @@ _ROUNDING = 1e-9  # relative; figures that differ by less are the same
 def against(verdict: Verdict, earlier: Sequence[Verdict], file: str) -> Verdict:
     """A verdict that knows the one of the same spec in a baseline.
 
-    The same spec is the one of that path, else the only one of that name, else, where the file
-    holds a single verdict, that one.
+    The same spec is the one of that path, else the only one of that name; a lone verdict of neither
+    is another spec's, whose misses forgive none here.
     """
     before = _of_same_spec(verdict, earlier)
     if before is None:
@@ -41,7 +41,6 @@ def _of_same_spec(verdict: Verdict, earlier: Sequence[Verdict]) -> Verdict | Non
     for same in (
         [one for one in earlier if one.file == verdict.file],
         [one for one in earlier if one.name == verdict.name],
-        earlier,
     ):
         if len(same) == 1:
             return same[0]

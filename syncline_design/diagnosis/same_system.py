@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Json
 from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import Dimension, split_suffix, suffix_unit
@@ -84,14 +85,37 @@ def _plain(value: Any) -> Any:
     return value
 
 
+# what decides how a system is driven and what is known of it, not how it measures
+_DRIVEN: Final = ("platform", "look", "rate_hz", "effects")
 _DISTRIBUTIONS: Final = ("Uniform", "Normal", "Constant", "Empirical")
 
 
-def differences(kept: Any, own: Any) -> Iterator[str]:
-    """`stage 1, the position sensor, its sigma north: 12 mm in the store, 20 mm in the spec`."""
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Where two descriptions differ, what each has there, and whether it makes the measurements
+    others: a sensor, a lever arm, a timing error; not a limit of the platform, a rate, what is
+    listed as known."""
+
+    place: str
+    kept: str
+    own: str
+    measures: bool
+
+    def words(self, where: str) -> str:
+        """`stage 1, the position sensor, its sigma, north: 12 mm in the store, 20 mm in the
+        spec`."""
+        return f"{self.place}: {self.kept} in {where}, {self.own} in the spec"
+
+
+def differences(kept: Any, own: Any) -> Iterator[Difference]:
+    """What differs between a description that was kept and a system's own."""
     for path, there, here in _unlike(kept, own, ()):
-        found, written = _shown_apart(there, here, path)
-        yield f"{_place(path)}: {found} in the store, {written} in the spec"
+        yield Difference(_place(path), *_shown_apart(there, here, path), _measures(path))
+
+
+def _measures(path: Path) -> bool:
+    """Whether measurements and their noise rest on what stands there."""
+    return not any(part in _DRIVEN for part in path)
 
 
 def _unlike(kept: Any, own: Any, path: Path) -> Iterator[tuple[Path, Any, Any]]:
