@@ -26,6 +26,7 @@ from syncline_design.diagnosis.noise import row_covariance
 from syncline_design.diagnosis.run import examined
 from syncline_design.diagnosis.sufficient import Less, Sufficient, shown_level, sufficient
 from syncline_design.diagnosis.system import measured
+from syncline_design.effects import registry
 from syncline_design.machine.appended_files import append_line
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.report.result_schemas import result_schema
@@ -107,6 +108,20 @@ def test_values_of_every_scope_are_those_of_stacked_least_squares(scope: str) ->
     np.testing.assert_allclose(np.diag(found), np.diag(moderated), rtol=1e-6)
     assert count == free + 30 + 1
     np.testing.assert_allclose(judged.model, np.linalg.inv(stacked.T @ stacked), rtol=1e-6)
+
+
+def test_parameters_are_called_by_their_own_names() -> None:
+    """Whatever the order of their names: north, east and down of the datum are not sorted."""
+    every = [
+        (e.name, e.sensors[0], 0, p.name) for e in registry().values() for p in e.slopes()
+    ]  # fmt: skip
+    size = len(every)
+    one = Sufficient(tuple(every), np.eye(size), np.zeros(size), 0.0, np.eye(size), ())
+    pool = pool_of([one], [1])
+    assert len(pool.terms) > 30
+    for term in pool.terms:
+        names = [pool.labels[k][3] for k in term.index]
+        assert names == [p.name for p in term.effect.slopes()]
 
 
 def test_the_order_of_logs_changes_nothing() -> None:

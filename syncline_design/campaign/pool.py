@@ -74,16 +74,24 @@ class Pool:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """Every effect that some log knows of."""
-        found: dict[tuple[str, str, int], list[int]] = {}
-        for k, (name, sensor, stage, _) in enumerate(self.labels):
-            found.setdefault((name, sensor, stage), []).append(k)
+        """Every effect that some log knows of, its parameters in the order of its slopes."""
+        found: dict[tuple[str, str, int], dict[str, int]] = {}
+        for k, (name, sensor, stage, parameter) in enumerate(self.labels):
+            found.setdefault((name, sensor, stage), {})[parameter] = k
         known = registry()
-        return tuple(
-            Term(known[name], sensor, stage, np.array(index))
-            for (name, sensor, stage), index in sorted(found.items())
-            if name in known and np.any(self.seen[:, index])
+        every = (
+            Term(
+                known[name],
+                sensor,
+                stage,
+                np.array(
+                    [at[p.name] for p in known[name].slopes() if p.name in at], dtype=np.int64
+                ),
+            )
+            for (name, sensor, stage), at in sorted(found.items())
+            if name in known
         )
+        return tuple(term for term in every if np.any(self.seen[:, term.index]))
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:

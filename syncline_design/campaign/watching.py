@@ -16,8 +16,8 @@ from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.changes import Change, Changes
 from syncline_design.campaign.joint import JointError
 from syncline_design.campaign.looks import KeptLook, keys_of, known_first
-from syncline_design.campaign.naming import Naming
-from syncline_design.campaign.pool import Pool, Term, fitted, inverted, pool_of
+from syncline_design.campaign.pool import Pool, Term, pool_of
+from syncline_design.campaign.run_values import RunParameter, run_values
 from syncline_design.campaign.store import (
     Entry,
     Stored,
@@ -224,8 +224,7 @@ class Watching:
                 break
             if not found and total < math.log(2.0):  # it went back: as it stood when it rang
                 total, table = changes.log_evidence(first)
-                one = _best(changes, first, table, first, total)
-                return (one,)
+                return (_best(changes, first, table, first, total),)
             found.append(_best(changes, look, table, first, total))
             changes = changes.without(found[-1].change)
         return tuple(found)
@@ -310,7 +309,7 @@ class Watching:
     def _runs(self) -> Iterator[WatchedRun]:
         """Every run of every baseline, with what it tells alone beside what is named."""
         place = {e.number: k for k, e in enumerate(self.ordered)}
-        values = _values(self.pool, self.changes.within)
+        values = run_values(self.changes, [one.change for one in self.seen], RATE)
         for entry in self.stored.entries:
             k = place.get(entry.number)
             known = None if k is None or k == 0 else self.course[k - 1]
@@ -325,19 +324,19 @@ class Watching:
                 baseline=1 + sum(after < entry.number for after in self.stored.baselines),
                 e_value=None if known is None else math.exp(min(known, 690.0)),
                 new=entry.number > self.before,
-                values=() if k is None else tuple(self._told(*v) for v in values[k]),
+                values=() if k is None else tuple(map(self._told, values[k])),
             )
 
-    def _told(self, term: Term, k: int, value: float, spread: float | None) -> RunValue:
-        half = None if spread is None else NORMAL_95 * spread
+    def _told(self, one: RunParameter) -> RunValue:
+        term, half = one.term, None if one.spread is None else NORMAL_95 * one.spread
         return RunValue(
             term.effect.name,
             term.sensor,
             self._stage(term.stage),
-            term.effect.slopes()[k].name,
-            value,
-            spread,
-            None if half is None else (value - half, value + half),
+            term.effect.slopes()[one.place].name,
+            one.value,
+            one.spread,
+            None if half is None else (one.value - half, one.value + half),
         )
 
     def _cautions(self) -> Iterator[str]:
@@ -387,21 +386,3 @@ def _best(changes: Changes, look: int, table: Array, first: int, total: float) -
 
 def _look(key: str, evidence: float, within: Array, between: Array) -> KeptLook:
     return KeptLook(key, evidence, tuple(map(float, within)), tuple(map(float, between)))
-
-
-def _values(pool: Pool, within: Array) -> list[list[tuple[Term, int, float, float | None]]]:
-    """Each effect's parameters by every run alone, beside what all runs name together."""
-    named = Naming(pool, RATE, 4, whole=("build",)).named().fit
-    found: list[list[tuple[Term, int, float, float | None]]] = [[] for _ in range(pool.count)]
-    for c, term in enumerate(pool.terms):
-        rest = tuple(s for s in named.scoped if s.term.label != term.label)
-        beside = fitted(pool, rest)
-        at, of = beside.columns(0)  # one value in all runs: the same columns in every one
-        left = pool.score - pool.normal[:, :, of] @ beside.values[at]
-        inverse = inverted(pool.normal[:, term.index[:, None], term.index])
-        values = (inverse @ left[:, term.index, None])[:, :, 0]
-        spread = np.sqrt(max(1.0, float(np.mean(within[:, c]))) * np.einsum("rkk->rk", inverse))
-        for run, k in np.ndindex(values.shape):
-            own = float(spread[run, k])
-            found[run].append((term, k, float(values[run, k]), own if own > 0.0 else None))
-    return found

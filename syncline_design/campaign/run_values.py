@@ -1,0 +1,81 @@
+"""What every run by itself says of each effect, for the course over the runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.changes import Change, Changes
+from syncline_design.campaign.naming import Naming
+from syncline_design.campaign.pool import Fitted, Pool, Term, fitted, inverted
+from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
+
+MOST_NAMED: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class RunParameter:
+    """A parameter of an effect by one run: its place in the effect, value and standard
+    uncertainty; None where the run says nothing of it."""
+
+    term: Term
+    place: int
+    value: float
+    spread: float | None
+
+
+def run_values(
+    changes: Changes, seen: Sequence[Change], rate: float
+) -> tuple[tuple[RunParameter, ...], ...]:
+    """Each effect's parameters by every run alone, beside what all runs name together.
+
+    seen: the changes that were seen; one that went back is none by all runs.  They are taken off
+    before anything is named, or the mean of a change would pass for what the system has all along
+    and shift the runs before it; off what is fitted, too, but for the course of the very effect
+    that changed.
+    """
+    standing: list[Change] = []
+    for one in seen:
+        if _stands(reduce(Changes.without, standing, changes).pool, one):
+            standing.append(one)
+    quiet = reduce(Changes.without, standing, changes).pool
+    named = Naming(quiet, rate, MOST_NAMED, whole=("build",)).named().fit
+    found: list[list[RunParameter]] = [[] for _ in range(quiet.count)]
+    for c, term in enumerate(quiet.terms):
+        rest = tuple(s for s in named.scoped if s.term.label != term.label)
+        others = [one for one in standing if one.term.label != term.label]
+        pool = reduce(Changes.without, others, changes).pool
+        values, inverse = _alone(pool, fitted(quiet, rest), term)
+        grown = max(1.0, float(np.mean(changes.within[:, c])))
+        spread = np.sqrt(grown * np.einsum("rkk->rk", inverse))
+        for run, k in np.ndindex(values.shape):
+            own = float(spread[run, k])
+            told = RunParameter(term, k, float(values[run, k]), own if own > 0.0 else None)
+            found[run].append(told)
+    return tuple(map(tuple, found))
+
+
+def _stands(pool: Pool, one: Change) -> bool:
+    """Whether all runs are likelier with a change than without it, with one value of everything.
+
+    log L(d) = sum over its runs (g_c' d - d' I_cc d / 2) + (g - w)' S^+ (g - w) / 2,
+    with g and S of all runs together and w = sum over its runs I_c d.
+    """
+    own, d = one.term.index, one.values
+    later = pool.normal[one.k :].sum(axis=0)
+    score, total = pool.score.sum(axis=0), inverted(pool.normal.sum(axis=0))
+    left = score - later[:, own] @ d
+    gained = pool.score[one.k :, own].sum(axis=0) @ d - 0.5 * d @ later[np.ix_(own, own)] @ d
+    return bool(gained + 0.5 * left @ total @ left > 0.5 * score @ total @ score)
+
+
+def _alone(pool: Pool, beside: Fitted, term: Term) -> tuple[Array, Array]:
+    """An effect's values by every run beside what is fitted, and their covariance."""
+    at, of = beside.columns(0)  # one value in all runs: the same columns in every one
+    left = pool.score - pool.normal[:, :, of] @ beside.values[at]
+    inverse = inverted(pool.normal[:, term.index[:, None], term.index])
+    return (inverse @ left[:, term.index, None])[:, :, 0], inverse
