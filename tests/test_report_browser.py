@@ -335,7 +335,7 @@ def joint_page(folder: Path) -> str:
     )  # fmt: skip
     paths = []
     for k, size_m in enumerate((0.5, -0.4, 0.3)):
-        run = scenario("multirotor_lines", 70 + k, 30.0, 5.0)
+        run = scenario("multirotor_lines", 70 + k, 8.0, 5.0)
         log = make_log(run, (late, bias.with_values({"bias_m": size_m})))
         paths.append(folder / f"log{k}.csv")
         log.to_csv(paths[-1])
