@@ -160,3 +160,12 @@ def test_markdown_has_headings_tables_and_lists() -> None:
         "## ? a\\_b: No verdict", "", "Why.", "", "**Price** 1 EUR", "", "### Part", "",
         "- one", "- two", "", "**T**", "", "| x | y |", "| --- | ---: |", "| 1 | 2 |",
     ]  # fmt: skip
+
+
+def test_what_our_words_have_in_backticks_is_code_on_a_page_and_an_odd_one_stays() -> None:
+    words = d.coded("`motion:` says more, `log: {files}` too")
+    assert [(s.text, s.style) for s in words] == [
+        ("motion:", "code"), (" says more, ", ""), ("log: {files}", "code"), (" too", ""),
+    ]  # fmt: skip
+    assert d.coded("a file `x", "given") == (d.Span("a file `x", "given"),)
+    assert d.plain(words) == "motion: says more, log: {files} too"

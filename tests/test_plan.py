@@ -616,6 +616,22 @@ def test_a_diagnosis_without_a_drive_says_why_and_prints_the_command_that_looks_
     jsonschema.validate(replace(found, plan=late).to_json(), result_schema("diagnosis"))
 
 
+def test_a_drive_of_more_than_some_hours_is_none_and_no_manoeuvre_is_promised(
+    straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
+    monkeypatch.setattr(next_drive, "LONGEST_S", 1.0)
+    drive = next_drive.next_drive(load(straight[0]), found)
+    assert drive is not None
+    assert (drive.minutes, drive.legs) == (None, ())
+    assert drive.why_none is not None
+    assert drive.why_none.startswith("No test drive of this platform of up to 1 s was found")
+    words = render_diagnose("markdown", replace(found, plan=drive)).replace("\\", "")
+    assert "It takes" not in words
+    assert "To separate them" not in words
+    assert "No drive that does was found." in words
+
+
 def test_a_class_that_no_drive_tells_is_said_to_be_one(
     straight: tuple[Path, Path], diagnosed: Path
 ) -> None:

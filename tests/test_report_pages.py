@@ -16,20 +16,31 @@ from html_page import Page
 from syncline_design.comparison.meaning import DiagnosisAndDesign, ErrorFigure
 from syncline_design.comparison.repairs import Repair, RepairStep
 from syncline_design.diagnosis.findings import estimate, finding
-from syncline_design.diagnosis.result import MotionQuantiles, Rival, WholeGap
+from syncline_design.diagnosis.result import (
+    Estimate,
+    Joint,
+    MotionQuantiles,
+    NextDrive,
+    PerLog,
+    Rival,
+    WholeGap,
+)
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.model.known import EffectEntry
 from syncline_design.paper.plots import SimulatedPoint
 from syncline_design.paper.reproduce import reproduce
 from syncline_design.report import numbers
+from syncline_design.report.document import TableNode
 from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.on_joint import scope_nodes
 from syncline_design.report.on_paper import on_paper
 from syncline_design.report.on_simulation import on_simulation
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
 from syncline_design.report.text import visible
+from syncline_design.report.words import effect_words
 from syncline_design.simulation import SimulationSettings, simulate
 from syncline_design.verdict.tree import decided
 from tests.simulation_systems import fixed_wing
@@ -321,3 +332,49 @@ def test_the_tau_of_stamps_is_not_called_the_systems_where_a_latency_adds_to_it(
         text = " ".join(console(on_simulation(result, system)).split())
         assert words in text
         assert ("system's own" in text) == (system is plain)
+
+
+def test_a_column_of_many_logs_is_in_one_unit_and_in_words() -> None:
+    every = [Estimate(988e-6, 387e-6, "s", True, "988 \u00b1 387 us"),
+             Estimate(1.1e-3, 0.6e-3, "s", True, "1.1 \u00b1 0.6 ms"),
+             Estimate(0.0, math.inf, "s", False, "(not seen)")]  # fmt: skip
+    logs = tuple(PerLog(k, f"{k}.csv", f"#{k}", {"time_constant_s": one})
+                 for k, one in enumerate(every, 1))  # fmt: skip
+    found = replace(LATENCY, effect="filter_lag", scope="log", per_log=logs, one_value=1e-4)
+    (shown,) = (node for node in scope_nodes(found) if isinstance(node, TableNode))
+    assert [row[2].text for row in shown.table.rows] == [
+        "1.0 \u00b1 0.4 ms", "1.1 \u00b1 0.6 ms", "(not seen)",
+    ]  # fmt: skip
+    assert shown.table.heads[2].text == "time constant"
+    assert shown.table.caption == "filter lag (position) in each log"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("lever_arm(position): x_m, z_m", "lever arm (position): x, z"),
+        ("timestamp_drift(attitude)", "timestamp drift (attitude)"),
+        ("lever_arm (auv.position): z_m", "lever arm (auv.position): z"),
+    ],
+)
+def test_effects_are_called_as_the_field_calls_them(text: str, said: str) -> None:
+    assert effect_words(text) == said
+
+
+def test_logs_taken_together_are_several_where_the_drive_is_told() -> None:
+    drive = NextDrive("latency(position)", "lever_arm(position)", 2.0, 2.0, True, ("1 slalom",), 4,
+                      "syncline-design plan spec.yaml")  # fmt: skip
+    one = markdown(on_diagnosis(diagnosis(plan=drive)))
+    assert "This log cannot tell latency" in one
+    joint = Joint((), 1, None, None, 0)
+    several = markdown(on_diagnosis(diagnosis(plan=drive, joint=joint)))
+    assert "These logs cannot tell latency" in several
+
+
+def test_a_sentence_has_the_micro_sign_as_the_figures_below_it() -> None:
+    """In a terminal, on the page and in Markdown; the JSON keeps its ASCII."""
+    found = diagnosis(findings=(replace(LATENCY, sentence="Stamps are 854 us late"),))
+    for shown in (console, html, markdown):
+        words = shown(on_diagnosis(found)).replace("\u00a0", " ")
+        assert "854 \u00b5s late" in words
+        assert "854 us" not in words

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 
 from syncline_design.model.unit_table import DEG, LADDERS, UNITS, Dimension
@@ -73,7 +74,10 @@ def format_estimate(value: float, uncertainty: float | None = None, unit: str = 
     """`87.1 ± 0.3 ms`: the uncertainty to one or two figures (GUM 7.2.6), the value to the same
     place, both in the unit that reads best.
     """
-    name, scale = _rung(abs(value), unit)
+    return _estimate(value, uncertainty, *_rung(abs(value), unit))
+
+
+def _estimate(value: float, uncertainty: float | None, name: str, scale: float) -> str:
     shown = value / scale
     if uncertainty is None or not uncertainty > 0.0 or not math.isfinite(uncertainty):
         return f"{to_digits(shown, 4)} {name}".strip()
@@ -82,6 +86,14 @@ def format_estimate(value: float, uncertainty: float | None = None, unit: str = 
     digits = 1 if float(mantissa) < 3.0 else 0  # two figures of 1.0 to 2.9, else one
     places = max(0, digits - int(exponent))
     return f"{to_places(shown, places)} ± {to_places(spread, places)} {name}".strip()
+
+
+def format_estimates(
+    column: Sequence[tuple[float, float | None]], unit: str = ""
+) -> tuple[str, ...]:
+    """Values with their uncertainties in one unit, that of the largest value, to be compared."""
+    name, scale = _rung(max((abs(value) for value, _ in column), default=0.0), unit)
+    return tuple(_estimate(value, spread, name, scale) for value, spread in column)
 
 
 def _rung(size: float, unit: str) -> tuple[str, float]:

@@ -11,10 +11,10 @@ from syncline_design.diagnosis.result import Diagnosis, Finding, NextDrive, Riva
 from syncline_design.effects import registry
 from syncline_design.machine.deadline import NoVerdict, within_s
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_places
+from syncline_design.model.figure_text import format_duration, to_places
 from syncline_design.planning.from_diagnosis import moves, sizes_of
-from syncline_design.planning.run import plan
-from syncline_design.planning.setup import PlanRequest
+from syncline_design.planning.run import LONGEST_S, plan
+from syncline_design.planning.setup import SECONDS, PlanRequest
 from syncline_design.planning.telling import PlanRun
 from syncline_design.planning.wanted import (
     EffectPair,
@@ -40,7 +40,7 @@ def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
     """
     classes = list(_classes(found, len(case.stages) > 1))[:MOST_TRIED]
     untold: list[AliasClass] = []
-    now = None
+    who, now = "This log" if found.joint is None else "These logs", None
     try:
         with within_s(LIMIT_S):
             for now in classes:
@@ -49,7 +49,7 @@ def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
                     return drive
                 untold.append(now)
     except NoVerdict:
-        return _none(case, now, _TOO_LATE) if now else None
+        return _none(case, now, _TOO_LATE.replace("{who}", who)) if now else None
     except (BadInput, PlanError) as error:
         return _none(case, now, f"No test drive could be planned, {error}") if now else None
     return _none(case, untold[0], _untold_words(untold), untold[0].rivals) if untold else None
@@ -81,13 +81,14 @@ def _told(case: Case, one: AliasClass) -> NextDrive | None:
     """The drive that tells a finding from all of its class that some drive tells it from.
 
     Where none does in the minutes and in the time of a diagnosis, the one that tells it from the
-    commonest that can be told.
+    commonest that can be told.  What would take longer than `LONGEST_S` is no drive.
     """
     lost: list[NamedEffect] = []
     for rival in one.rivals[:MOST_TRIED]:
         commonest = one.only([rival])
         run = _planned(case, commonest)
-        if run.result.least_minutes is not None:
+        least = run.result.least_minutes
+        if least is not None and SECONDS * least <= LONGEST_S:
             return _whole(case, one.only([r for r in one.rivals if r not in lost]), lost) or (
                 _short(case, run, commonest, lost)
             )
@@ -114,16 +115,17 @@ def _planned(case: Case, one: AliasClass) -> PlanRun:
 
 
 _TOO_LATE: Final = (
-    "This log cannot tell {first} from {second}. No drive that does was found in the time that a "
+    "{who} cannot tell {first} from {second}. No drive that does was found in the time that a "
     "diagnosis gives it; this looks on"
 )
 
 
 def _untold_words(untold: Sequence[AliasClass]) -> str:
     pairs = "; ".join(f"{one.first.text} from {r.text}" for one in untold for r in one.rivals)
+    most = format_duration(LONGEST_S)
     return (
-        f"No test drive of this platform was found that tells {pairs}, at the size that was found. "
-        "What one shows"
+        f"No test drive of this platform of up to {most} was found that tells {pairs}, at the size "
+        "that was found. What one shows"
     )
 
 

@@ -98,7 +98,7 @@ def _panel(
     title = f"{shortened(name, 26)}\n{sensor}" if many else shortened(f"{name} ({sensor})", 40)
     axes.set_title(title, loc="left", pad=3)
     figure, _, _ = parameter.rpartition("_")
-    axes.set_ylabel(f"{figure or parameter}{f', {unit}' if unit else ''}")
+    axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
     _whole_ticks(axes, [r.run for r in runs])
     axes.margins(x=0.06)
 
@@ -170,7 +170,7 @@ def _logs_panel(
                               f"{numbers.number(high / scale, 4)} {unit}"),
         ])  # fmt: skip
     figure, _, _ = parameter.rpartition("_")
-    axes.set_ylabel(f"{figure or parameter}{f', {unit}' if unit else ''}")
+    axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
     axes.set_xlabel("log")
     _whole_ticks(axes, [one.log for one in logs])
     axes.margins(x=0.08)

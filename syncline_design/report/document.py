@@ -217,6 +217,17 @@ def spans(words: Inline) -> tuple[Span, ...]:
     return tuple(span for span in found if span.text)
 
 
+def coded(text: str, style: Style = "") -> tuple[Span, ...]:
+    """Words of ours as they stand in a terminal or in JSON, what they have in backticks as code.
+
+    An odd backtick stays as it is, with all others.
+    """
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        return (Span(text, style),)
+    return tuple(Span(part, "code" if k % 2 else style) for k, part in enumerate(parts) if part)
+
+
 def plain(words: Inline) -> str:
     """Inline text without its styles."""
     return "".join(span.text for span in spans(words))

@@ -25,6 +25,7 @@ from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.quantity import split_suffix
+from syncline_design.planning.from_diagnosis import moves
 from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import numbers
 from syncline_design.report.document import (
@@ -50,6 +51,7 @@ from syncline_design.report.on_residuals import residual_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_charts import tightest_limit
+from syncline_design.report.words import effect_words
 
 DIAGNOSES: Final[dict[str, Outcome]] = {
     "agrees": Outcome(
@@ -86,8 +88,8 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
             *section("gap", "How much of the gap is closed", gap_nodes(found), "Gap"),
             *section("residuals", "Residuals", residual_nodes(found.plots)),
             *section("where", "Where they disagree", _where(found), "Where"),
-            *section("drive", "The drive that would tell", _drive(found.plan), "Drive"),
-            *section("unseen", "What this log cannot show", _items(found.unseen), "Not shown"),
+            *section("drive", "The drive that would tell", _drive(found), "Drive"),
+            *section("unseen", "What this log cannot show", _unseen(found), "Not shown"),
             *section("design", "What it means for the design", _design(found.design), "Design"),
             *section("repairs", "What would put it right", repair_nodes(found), "Repairs"),
             *section("logs", "Log by log", joint_nodes(found.joint), "Logs"),
@@ -98,18 +100,20 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
     )
 
 
-def _drive(plan: NextDrive | None) -> list[Node]:
+def _drive(found: Diagnosis) -> list[Node]:
     """The test drive for a class, in short, and the command that prints it whole."""
+    plan = found.plan
     if plan is None:
         return []
+    who = "This log" if found.joint is None else "These logs"
     if plan.minutes is None:
         return [Text((f"{plan.why_none}: ", code(plan.command)))]
     length = numbers.typeset(f"{numbers.number(plan.minutes, 2)} min")
     told = sentence_list([plan.second, *(plan.others or ())])
-    words = f"This log cannot tell {plan.first} from {told}. A drive of {length} does:"
+    words = f"{who} cannot tell {plan.first} from {told}. A drive of {length} does:"
     if not plan.reached:
         least = numbers.typeset(f"{numbers.number(plan.least_minutes or plan.minutes, 2)} min")
-        words = f"This log cannot tell {plan.first} from {told}. It takes {least} of:"
+        words = f"{who} cannot tell {plan.first} from {told}. It takes {least} of:"
     targets = f", over {plan.targets} surveyed targets" if plan.targets else ""
     more = f"Whole, with waypoints{targets}: "
     nodes: list[Node] = [Text(words), Items(plan.legs), Text((more, code(plan.command)))]
@@ -121,8 +125,8 @@ def _drive(plan: NextDrive | None) -> list[Node]:
     return nodes
 
 
-def _items(lines: Sequence[str]) -> list[Node]:
-    return [Items(tuple(lines))] if lines else []
+def _unseen(found: Diagnosis) -> list[Node]:
+    return [Items(tuple(effect_words(line) for line in found.unseen))] if found.unseen else []
 
 
 def outcome_of(found: Diagnosis) -> Outcome:
@@ -166,7 +170,7 @@ def _found_text(found: Diagnosis) -> str:
 
 def _called(one: Finding) -> str:
     """The sentence of a cause; of a stand-in, that it is none."""
-    text = one.sentence
+    text = numbers.micro(one.sentence)
     return text if one.kind == "cause" else f"Not as a cause, as the nearest word for it: {text}"
 
 
@@ -238,7 +242,9 @@ def _findings(found: Diagnosis) -> list[Node]:
     if lines := noise_lines(found.findings):
         nodes.append(Items(tuple(lines)))
     slight = [
-        f"{_effect_of(one)}: {_figures_of(one)}" for one in found.findings if not one.material
+        f"{_effect_of(one)}: {numbers.micro(_figures_of(one))}"
+        for one in found.findings
+        if not one.material
     ]
     if slight:
         nodes.append(Text(f"Seen, immaterial: {'; '.join(slight)}.", quiet=True))
@@ -286,9 +292,15 @@ def _varying_text(found: Finding, varying: Sequence[Stretch]) -> str:
 
 
 def _apart(found: Finding, aliases: Sequence[Rival], drive: NextDrive | None) -> str:
-    """What would tell a finding from its aliases; that nothing does where none of them is told."""
+    """What would tell a finding from its aliases; that nothing does where none of them is told.
+
+    In one voice with the drive below: where that is none, no manoeuvre is promised here.
+    """
+    if drive is not None and drive.minutes is None:
+        return "No drive that does was found."
     lost = drive.inseparable or () if drive is not None and drive.first in _spelt(found) else ()
-    if lost and all(any(name in lost for name in _spelt(one)) for one in aliases):
+    driven = [one for one in aliases if moves(one.effect)]
+    if lost and driven and all(any(name in lost for name in _spelt(one)) for one in driven):
         return "No drive of this platform does in ten minutes, at this size."
     return f"To separate them: {found.separated_by}."
 

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from syncline_design.diagnosis.result import Finding, Joint, LogAlone
+from syncline_design.diagnosis.result import Estimate, Finding, Joint, LogAlone
+from syncline_design.model.figure_text import format_estimates
+from syncline_design.model.quantity import split_suffix
 from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
 from syncline_design.report.document import Chart, Node, Text, code, show
@@ -30,15 +32,29 @@ def scope_nodes(found: Finding) -> list[Node]:
     nodes: list[Node] = [Text(words), *_by_log(found)]
     if found.per_log and any(one.parameters for one in found.per_log):
         names = list(found.per_log[0].parameters)
+        columns = [_column([one.parameters[n] for one in found.per_log]) for n in names]
         rows: list[tuple[Cell | str, ...]] = [
-            (str(one.log), one.file, *(Cell(one.parameters[n].text) for n in names))
-            for one in found.per_log
+            (str(one.log), one.file, *cells)
+            for one, cells in zip(found.per_log, zip(*columns, strict=True), strict=True)
         ]
-        heads = ("Log", "File", *(f"{name} #" for name in names))
-        nodes += show(table(f"{found.effect} ({found.sensor}) in each log", heads, rows))
+        heads = ("Log", "File", *(f"{split_suffix(name)[0].replace('_', ' ')} #" for name in names))
+        called = found.effect.replace("_", " ")
+        nodes += show(table(f"{called} ({found.sensor}) in each log", heads, rows))
     elif found.per_log:
         nodes.append(Text(f"In {', '.join(one.file for one in found.per_log)}."))
     return nodes
+
+
+def _column(estimates: Sequence[Estimate]) -> list[Cell]:
+    """A parameter by every log, all in one unit."""
+    pairs = {
+        k: (one.value, one.standard_uncertainty)
+        for k, one in enumerate(estimates)
+        if one.seen and not isinstance(one.value, str)
+    }
+    texts = format_estimates(list(pairs.values()), estimates[0].unit)
+    shown = dict(zip(pairs, texts, strict=True))
+    return [Cell(numbers.micro(shown.get(k, one.text))) for k, one in enumerate(estimates)]
 
 
 def _by_log(found: Finding) -> list[Node]:

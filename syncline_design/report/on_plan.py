@@ -18,17 +18,20 @@ from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,
     Document,
+    Inline,
     Items,
     Node,
     Outcome,
     Text,
     code,
+    coded,
     provenance,
     section,
     show,
 )
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
+from syncline_design.report.words import effect_words
 
 UNITS: Final = {
     Dimension.TIME: "s", Dimension.LENGTH: "m", Dimension.ANGLE: "rad",
@@ -77,7 +80,7 @@ def _outcome(found: Plan) -> Outcome:
     return Outcome("bad", "\u2717", f"Not reachable in {numbers.number(found.minutes, 6)} min")
 
 
-def _sentences(found: Plan) -> Iterator[str]:
+def _sentences(found: Plan) -> Iterator[Inline]:
     if not found.reached and found.least_minutes is not None:
         least = _minutes(_upwards(found.least_minutes))
         given = f"{numbers.number(found.minutes, 6)} min"
@@ -94,8 +97,9 @@ def _sentences(found: Plan) -> Iterator[str]:
             "apart would take it, left free one at a time."
         )
     if found.confused:
-        yield f"Left free one at a time, these would take it: {', '.join(found.confused)}."
-    yield from found.cautions or ()
+        names = ", ".join(map(effect_words, found.confused))
+        yield f"Left free one at a time, these would take it: {names}."
+    yield from map(coded, found.cautions or ())
 
 
 def _how_far(found: Plan) -> str:
@@ -288,7 +292,7 @@ def _open(found: Plan) -> list[Node]:
         )
     if found.unseen:
         words = "With every effect free, this drive leaves these as uncertain as before: "
-        nodes.append(Text(words + ", ".join(found.unseen) + "."))
+        nodes.append(Text(words + "; ".join(map(effect_words, found.unseen)) + "."))
     return nodes
 
 
@@ -332,7 +336,7 @@ def _rests(found: Plan) -> list[Node]:
     lines = [f"Noise {found.noise}."]
     if found.assumed:
         lines.append("Not stated by the spec, so taken as usual: " + "; ".join(found.assumed) + ".")
-    return [Items(tuple(lines))]
+    return [Items(tuple(map(coded, lines)))]
 
 
 def _provenance(found: Plan) -> list[tuple[str, str]]:

@@ -25,6 +25,7 @@ from syncline_design.report.document import (
     Outcome,
     Text,
     code,
+    coded,
     given,
     provenance,
     section,
@@ -151,7 +152,9 @@ def _alarm(one: Alarm) -> Node:
 
 
 def _odd(found: Watch) -> list[Node]:
-    nodes: list[Node] = [Items(found.cautions, mark="!", tone="warn")] if found.cautions else []
+    nodes: list[Node] = (
+        [Items(tuple(map(coded, found.cautions)), mark="!", tone="warn")] if found.cautions else []
+    )
     return [*nodes, *torn_nodes(found.torn)]
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
+from syncline_design.model.quantity import split_suffix
 from syncline_design.report.document import Outcome
 
 OUTCOMES: Final[dict[str, Outcome]] = {
@@ -102,3 +104,11 @@ SYNC_MODELS: Final[dict[str, str]] = {
     "syncline": "Syncline (the paper's)",
     "per_sensor": "per sensor (tighter)",
 }
+
+
+def effect_words(text: str) -> str:
+    """`lever_arm(position): x_m, z_m` as `lever arm (position): x, z`: as the field says it."""
+    name, colon, parts = text.partition(": ")
+    shown = re.sub(r"(?<=\w)\(", " (", name).replace("_", " ")
+    stems = ", ".join(split_suffix(part)[0].replace("_", " ") for part in parts.split(", "))
+    return f"{shown}{colon}{stems}"
