@@ -16,11 +16,11 @@ from syncline_design.effects.record import SELDOM, ActsOn, Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Stage
 
-STEP_TIMES = 24  # places along the log where a step is looked for at first
+STEP_TIMES = 30  # places along the log where a step is looked for at first
 MEMORIES_S = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # time constants whose shape is looked for as it is
 LEAST_MEMORY = 2.0  # stamps
 STEP = 1e-4  # of a value, by which it is moved for a slope: far below what bends, above rounding
-EDGE = 0.15  # share of the rows at either end where a step is not looked for: it would be a latency
+EDGE = 0.03  # share of the rows at either end where a step is not looked for: too few tell it
 
 
 @dataclass(frozen=True, slots=True)

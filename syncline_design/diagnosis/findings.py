@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 
 from syncline_design.diagnosis.cancelling import cancelling
-from syncline_design.diagnosis.candidates import EDGE
 from syncline_design.diagnosis.charges import fitted_figures
 from syncline_design.diagnosis.consequence import Weights, rms_m
 from syncline_design.diagnosis.episodes import Episode, episode_effect
@@ -44,7 +43,6 @@ Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
 ONE_VALUE = 0.001  # chance below which a parameter is not one value along the log
-EDGE_SHARE = 0.02  # of the log
 MOST_NATS = 300.0
 NOT_SEEN = "(not seen)"
 
@@ -198,7 +196,7 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
     others = tuple(a for a in model.acting if a.label != one.label)
     size_m = rms_m(final.data, final.data.error(others) - model.error)
     named = _finding(final, one.effect, one.label, found, size_m, weights)
-    if _at_the_edge(final, one) or one.label in final.refuted:
+    if one.label in final.refuted:
         named = replace(named, kind="stand_in")
     return _along_the_log(final, one, _in_its_part(named, one.effect))
 
@@ -215,16 +213,6 @@ def _in_its_part(named: Finding, effect: Effect) -> Finding:
     words = f"{named.sentence}, from {first} to {last}"
     kind = named.kind if effect.passing else "stand_in"
     return replace(named, sentence=words, kind=kind, from_s=span.from_s, to_s=span.to_s)
-
-
-def _at_the_edge(final: Settled, one: Acting) -> bool:
-    """Whether it begins as early or as late as is looked for: it stands for what always acts."""
-    time_s = final.data.view.log.time_s
-    since = time_s - time_s[0]
-    ends = np.quantile(since, [EDGE, 1.0 - EDGE])
-    near = EDGE_SHARE * float(since[-1])
-    places = [float(one.values[p.name]) for p in one.effect.parameters if p.located]
-    return any(bool(np.min(np.abs(ends - place)) < near) for place in places)
 
 
 def _along_the_log(final: Settled, one: Acting, named: Finding) -> Finding:

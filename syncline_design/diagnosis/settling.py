@@ -48,9 +48,9 @@ class Settled:
 
     judged: what noise that is not the model's lets be said of each effect that moves the mean.
     courses: how it runs along the log.  stairs: the model with the strongest effect alone, the
-    strongest two, ... , all of them.  refuted: steps that the data want to be ramps.  uneven:
-    effects that are no one value wherever the vehicle goes.  wandering: effects that are another
-    size every few seconds.
+    strongest two, ... , all of them.  refuted: steps that the data want to be ramps, or that do as
+    well from the start on.  uneven: effects that are no one value wherever the vehicle goes.
+    wandering: effects that are another size every few seconds.
     """
 
     data: Data
