@@ -88,7 +88,10 @@ class PlannedTarget(Record):
 
 @dataclass(frozen=True, slots=True)
 class Flown(Record):
-    """A log held against what was asked: its duration, and what it tells."""
+    """A log held against what was asked: its duration, and what it tells.
+
+    cautions: where it contradicts itself or what the platform can do, as another vehicle's does.
+    """
 
     files: tuple[str, ...]
     duration_s: float
@@ -96,6 +99,7 @@ class Flown(Record):
     sigma: Mapping[str, Unbounded]
     correlation: float | None
     reached: bool
+    cautions: tuple[str, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design import __version__
+from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.result import SpecRead
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
@@ -278,6 +279,7 @@ class Telling:
             self._sigma(information),
             self._correlation(information),
             bool(np.all(ratios <= 1.0)),
+            tuple(one.message for one in log_checks(view)) or None,
         )
 
 

@@ -270,13 +270,14 @@ def _standard_row(
 def _flown(flown: Flown | None) -> list[Node]:
     if flown is None:
         return []
-    lines = [f"{key}: {figure(key, value)}" for key, value in flown.sigma.items()]
+    lines = [f"{parameter(key)}: {figure(key, value)}" for key, value in flown.sigma.items()]
     if flown.correlation is not None:
         lines.append(f"correlation {numbers.number(flown.correlation, 2)}")
     said = "reaches what is asked" if flown.reached else "does not reach what is asked"
     files = ", ".join(flown.files)
     words = f"{files}: {numbers.count(flown.rows)} rows, {numbers.time(flown.duration_s)}; {said}."
-    return [Text(words), Items(tuple(lines))]
+    odd = [Items(flown.cautions, "!", "warn")] if flown.cautions else []
+    return [Text(words), *odd, Items(tuple(lines))]
 
 
 def _open(found: Plan) -> list[Node]:
