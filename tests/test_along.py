@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,10 +74,13 @@ def test_the_mean_square_over_the_stretches_is_that_of_the_whole_flight(tmp_path
 
 
 def test_manoeuvres_and_free_motion_have_no_way_to_draw(tmp_path: Path) -> None:
-    system = fixed_wing()
-    for settings in (SimulationSettings(500), asked("circle", 500)):  # type: ignore[arg-type]
-        assert simulate(system, settings).monte_carlo.along is None
-    assert simulate(system, asked(flight(tmp_path), 500)).monte_carlo.along is not None
+    def way(settings: SimulationSettings) -> object:
+        one_tau = replace(settings, tau_grid_s=(1e-3,))  # the worst cases are not looked at
+        return simulate(fixed_wing(), one_tau).monte_carlo.along
+
+    assert way(SimulationSettings(500)) is None
+    assert way(asked("circle", 500)) is None  # type: ignore[arg-type]
+    assert way(asked(flight(tmp_path), 500)) is not None
 
 
 def test_a_page_draws_the_way_and_says_where_errors_are_largest(tmp_path: Path) -> None:

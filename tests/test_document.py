@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+from unittest.mock import ANY
 
 import pytest
 
 from html_page import Page
 from report_samples import HOSTILE
 from syncline_design.report import document as d
+from syncline_design.report import svg
 from syncline_design.report.render_console import WIDTH, console
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
-from syncline_design.report.svg import InlineChart, LogBox
+from syncline_design.report.svg import InlineChart, LogBox, add_axes, draw
 from syncline_design.report.table import Cell, table
 from syncline_design.report.text import visible
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def drawing() -> InlineChart:
@@ -169,3 +177,26 @@ def test_what_our_words_have_in_backticks_is_code_on_a_page_and_an_odd_one_stays
     ]  # fmt: skip
     assert d.coded("a file `x", "given") == (d.Span("a file `x", "given"),)
     assert d.plain(words) == "motion: says more, log: {files} too"
+
+
+def test_a_figure_is_laid_out_and_then_drawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As matplotlib lays it out by itself, which draws it twice: the marks at the same places."""
+    from matplotlib.axis import XAxis
+
+    drawn: list[XAxis] = []
+    plain = XAxis.draw
+    monkeypatch.setattr(XAxis, "draw", lambda axis, pen: (drawn.append(axis), plain(axis, pen))[1])
+
+    def build(figure: Figure) -> Axes:
+        axes = add_axes(figure, 1, 1, 1)
+        axes.loglog([1e-4, 2.0], [3.0, 4e5])
+        axes.set(xlabel="time difference (s)", ylabel="error (m)", title="Two lines\nof a title")
+        return axes
+
+    quick = draw("f", "a title", "what it shows", (420.0, 260.0), build)
+    assert len(drawn) == 1
+    monkeypatch.setattr(svg, "_lay_out", lambda figure: None)
+    assert draw("f", "a title", "what it shows", (420.0, 260.0), build) == replace(
+        quick, exported=ANY
+    )
+    assert len(drawn) == 3

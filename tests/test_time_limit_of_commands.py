@@ -93,8 +93,10 @@ def test_a_diagnosis_stands_without_what_it_means_for_the_design(
         raise OutOfTime
 
     monkeypatch.setattr(module, "meaning", too_long)
-    spec = tmp_path / "with_findings.yaml"
-    given = ["diagnose", *LOGGED, "--time-limit", "300", "--write-spec", str(spec)]
+    spec, log = tmp_path / "with_findings.yaml", tmp_path / "first_90_s.csv"
+    rows = Path(LOGGED[1]).read_text("utf-8").splitlines(keepends=True)
+    log.write_text("".join(rows[:901]), "utf-8")
+    given = ["diagnose", LOGGED[0], str(log), "--time-limit", "300", "--write-spec", str(spec)]
     done = CliRunner().invoke(app, given)
     assert done.exit_code == 1
     assert "latency" in done.stdout

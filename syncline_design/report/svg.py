@@ -160,10 +160,23 @@ def _drawn(size: tuple[float, float], build: Build) -> Iterator[tuple[Figure, Ax
 
 def _saved(figure: Figure, kind: Literal["svg", "png"], dpi: float, ground: str) -> bytes:
     """The figure as a file, without its date and maker: the same every time."""
+    if kind == "svg":
+        _lay_out(figure)
     stream = io.BytesIO()
     unsaid = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
     figure.savefig(stream, format=kind, metadata=unsaid, dpi=dpi, facecolor=ground)
     return stream.getvalue()
+
+
+def _lay_out(figure: Figure) -> None:
+    """Give the axes their places for SVG, once: saving would draw all of it once more for them."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    FigureCanvasSVG(figure)  # whose widths of words count
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def _places(height: float, notes: Sequence[_Note]) -> Iterator[Tip]:
