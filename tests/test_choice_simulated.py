@@ -258,12 +258,27 @@ def test_the_ledger_ends_where_simulation_fails(tmp_path: Path) -> None:
     assert row.payload_changes_at == pytest.approx(row.fails_at, rel=0.03)
 
 
-def test_a_waived_simulated_requirement_excludes_nothing(tmp_path: Path) -> None:
-    waiver = {"reason": "the buoy is out", "expires": "2999-01-01"}
-    loaded = spec(tmp_path, [simulated(0.001) | {"waiver": waiver}])
-    verdict = check_loaded(loaded, CheckSettings()).to_json()
+WAIVER = {"reason": "the buoy is out", "expires": "2999-01-01"}
+
+
+@pytest.mark.parametrize(("most", "nearest"), [(9999, "f"), (950, "d"), (200, "c")])
+def test_a_waived_simulated_requirement_is_missed_by_as_little_as_can_be(
+    most: int, nearest: str, tmp_path: Path
+) -> None:
+    """The sensor of the least noise that the money buys; f is as good as it gets."""
+    limits = [simulated(0.001) | {"waiver": WAIVER}, sums("cost", f"{most} EUR", "COST")]
+    verdict = check_loaded(spec(tmp_path, limits), CheckSettings()).to_json()
     assert verdict["verdict"] == "meets"
-    assert position(verdict["design"]) == "a"
+    assert position(verdict["design"]) == nearest
+    missed = {row["id"]: row["status"] for row in verdict["requirements"]}
+    assert missed == {"MC": "fail", "COST": "pass"}
+
+
+def test_a_waived_simulated_requirement_that_can_be_kept_is_kept(tmp_path: Path) -> None:
+    loaded = spec(tmp_path, [simulated(0.45) | {"waiver": WAIVER}])
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
+    assert position(verdict["design"]) == "c"
+    assert any("the waiver is not needed" in one["message"] for one in verdict["warnings"])
 
 
 def tolerances_of_c(loaded: Case) -> ToleranceVerdict:

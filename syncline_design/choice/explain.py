@@ -106,8 +106,19 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
         tuple(fixes),
         joint,
         cut_short=in_force().is_over,  # once over, every search after it ended without an answer
+        about=_about(case),
     )
     return told(found)
+
+
+def _about(case: Case) -> str | None:
+    """What a spec with waived requirements has none of."""
+    return f"No design meets this spec{even_waived(case)}." if case.eased else None
+
+
+def even_waived(case: Case) -> str:
+    """`, even with MASS-1 waived`, of a case whose waived requirements are left out."""
+    return f", even with {listed(list(case.eased))} waived" if case.eased else ""
 
 
 def _spending(problem: Problem) -> AbstractContextManager[None]:

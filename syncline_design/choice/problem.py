@@ -123,13 +123,15 @@ def _limits(case: Case) -> Limits:
     """The tightest limit of each kind; without a sync requirement 1.0 is implied."""
     tightest: dict[str, tuple[Fraction, str]] = {}
     for requirement in case.spec.requirements:
-        exact = case.limit(requirement)
+        exact = case.choice_limit(requirement)
         known = tightest.get(requirement.kind)
-        if known is None or exact < known[0]:
+        if exact is not None and (known is None or exact < known[0]):
             tightest[requirement.kind] = (exact, requirement.id)
     budgets = {name: tightest[name][0] if name in tightest else None for name in RESOURCES}
     accuracy = float(tightest["accuracy"][0]) if "accuracy" in tightest else None
-    sync = float(tightest["sync"][0]) if "sync" in tightest else 1.0
+    written = any(one.kind == "sync" for one in case.spec.requirements)
+    sync = math.inf if written else 1.0
+    sync = float(tightest["sync"][0]) if "sync" in tightest else sync
     spacing = float(tightest["sample_spacing"][0]) if "sample_spacing" in tightest else None
     ids = tuple((kind, name) for kind, (_, name) in tightest.items() if kind != "monte_carlo")
     return Limits(accuracy, sync, budgets["cost"], budgets["mass"], budgets["power"], ids, spacing)

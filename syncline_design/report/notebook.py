@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from syncline_design.report import numbers
 from syncline_design.report.document import Document, Outcome, section, show
 from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.verdict_words import with_waived
 from syncline_design.report.words import OUTCOMES
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def on_optimization(result: Optimization) -> Document:
     said = () if result.message is None else (result.message,)
     return Document(
         family="Optimization",
-        outcome=OUTCOMES[result.verdict],
+        outcome=with_waived(OUTCOMES[result.verdict], result.waived or ()),
         name=result.spec.name,
         sentences=said,
         facts=(),

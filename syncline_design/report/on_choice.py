@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -34,7 +35,7 @@ from syncline_design.report.on_infeasibility import infeasibility_nodes
 from syncline_design.report.on_nearest import asked_limit, nearest_nodes
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.verdict_words import qualification, warning_nodes
+from syncline_design.report.verdict_words import qualification, warning_nodes, with_waived
 from syncline_design.report.words import OBJECTIVES, OUTCOMES
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
@@ -91,7 +92,9 @@ def _outcome(found: Optimized) -> Outcome:
     objective = found.case.spec.objective
     best = OBJECTIVES.get(objective, objective)
     how = "proven" if found.result.proof.optimal else "not proven optimal"
-    return Outcome("good", "\u2713", f"Design of {best}, {how}{qualification(found.result)}")
+    shown = Outcome("good", "\u2713", f"Design of {best}, {how}")
+    shown = with_waived(shown, found.result.waived or ())
+    return replace(shown, word=shown.word + qualification(found.result))
 
 
 def _sentences(found: Optimized) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Literal
 
 from syncline_design.comparison.diff_result import (
     Cause,
@@ -16,12 +17,12 @@ from syncline_design.comparison.diff_result import (
 )
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
-from syncline_design.report.document import Document, Items, Node, section, show
+from syncline_design.report.document import Document, Items, Node, Outcome, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import kind_words, status_word
+from syncline_design.report.verdict_words import kind_words, status_word, with_waived
 from syncline_design.report.words import KINDS, OUTCOMES
 from syncline_design.verdict.tree import PREDICATES
 
@@ -44,12 +45,12 @@ def on_diff(data: Diff) -> Document:
     causes += [Items(lines, reach="text")] if lines else []
     return Document(
         family="Diff",
-        outcome=OUTCOMES[data.verdict.new],
+        outcome=_outcome(data, "new"),
         name=f"{data.old.file} \N{RIGHTWARDS ARROW} {data.new.file}",
         sentences=(headline(data), *reasons(data)),
         facts=(
-            ("Before", OUTCOMES[data.verdict.old].word),
-            ("Now", OUTCOMES[data.verdict.new].word),
+            ("Before", _outcome(data, "old").word),
+            ("Now", _outcome(data, "new").word),
         ),
         sections=(
             *section("causes", "What differs", causes),
@@ -58,6 +59,14 @@ def on_diff(data: Diff) -> Document:
             *section("margins", "Requirements", show(_margins(data), silent=True)),
         ),
     )
+
+
+def _outcome(data: Diff, side: Literal["old", "new"]) -> Outcome:
+    """One side's outcome, what is waived named."""
+    word = getattr(data.verdict, side)
+    found = [(one.id, getattr(one, side)) for one in data.requirements]
+    missed = [name for name, row in found if row and row.waived and row.status == "fail"]
+    return with_waived(OUTCOMES[word], missed if word == "meets" else ())
 
 
 def headline(data: Diff) -> str:

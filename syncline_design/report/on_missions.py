@@ -8,7 +8,13 @@ from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers, verdict_charts
 from syncline_design.report.document import Facts, Node, Text, show
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.verdict_words import kind_text, margin_text, status_of
+from syncline_design.report.verdict_words import (
+    kind_text,
+    margin_text,
+    status_of,
+    waived_of,
+    with_waived,
+)
 from syncline_design.report.words import OUTCOMES
 
 if TYPE_CHECKING:
@@ -37,7 +43,8 @@ def _by_requirement(found: tuple[MissionVerdict, ...]) -> Table:
     rows = []
     for mission in found:
         own = {row.id: row for row in mission.requirements}
-        outcome = OUTCOMES[mission.verdict]
+        missed = waived_of(mission.verdict, mission.requirements)
+        outcome = with_waived(OUTCOMES[mission.verdict], missed)
         rows.append((
             Cell(mission.name),
             Cell(outcome.word, tone=outcome.tone, mark=outcome.mark),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from syncline_design import __version__
@@ -32,6 +33,7 @@ from syncline_design.report.study_words import (
 from syncline_design.report.svg import InlineChart
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import with_waived
 from syncline_design.report.words import OUTCOMES
 from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
@@ -220,14 +222,14 @@ def _case_table(summary: StudySummary) -> Table:
     many = len(result.study.bases) > 1
     rows = []
     for brief in summary.briefs[:MOST_CASES]:
-        shown = OUTCOMES[brief.verdict]
+        shown = with_waived(replace(OUTCOMES[brief.verdict], word=brief.verdict), brief.waived)
         payload = ", ".join(pick.name for pick in brief.picks)
         why = payload or visible(reason(result.case(brief.number - 1)))
         named = [Cell(result.study.bases[brief.base].name)] if many else []
         rows.append([
             Cell(str(brief.number), float(brief.number)), *named,
             *_setting_cells(brief, several),
-            Cell(brief.verdict, tone=shown.tone, mark=shown.mark),
+            Cell(shown.word, tone=shown.tone, mark=shown.mark),
             Cell(numbers.money(brief.cost, brief.currency), brief.cost),
             Cell(numbers.length(brief.error_m), brief.error_m),
             Cell(why),

@@ -21,7 +21,7 @@ from syncline_design.report.document import (
 from syncline_design.report.on_verdict import on_verdict, problems
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_charts import tightest_limit
-from syncline_design.report.words import OUTCOMES
+from syncline_design.report.words import OUTCOMES, STATUSES
 from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 
@@ -32,6 +32,10 @@ def on_verdicts(verdicts: Sequence[Checked]) -> Document:
     good = sum(verdict.verdict == "meets" for verdict in verdicts)
     known = OUTCOMES["meets" if good == len(verdicts) else "fails"]
     word = f"{good} of {len(verdicts)} specs meet every requirement"
+    waived = sum(bool(_waived(verdict)) for verdict in verdicts)
+    if waived:
+        known = STATUSES["waived"] if known is OUTCOMES["meets"] else known
+        word += f", {waived} with waived ones missed"
     specs = [node for n, verdict in enumerate(verdicts, 1) for node in _spec(verdict, n)]
     return Document(
         family="Overview",
@@ -45,6 +49,12 @@ def on_verdicts(verdicts: Sequence[Checked]) -> Document:
         ),
         title=word,
     )
+
+
+def _waived(verdict: Checked) -> tuple[str, ...]:
+    if isinstance(verdict, Refused):
+        return ()
+    return verdict_words.waived_of(verdict.verdict, verdict.requirements)
 
 
 def _spec(verdict: Checked, index: int) -> list[Node]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from xml.etree import ElementTree
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report.ci import Level, Notice, requirement_sentence
 from syncline_design.report.github import github_command
 from syncline_design.report.sarif import sarif_log
@@ -131,6 +132,9 @@ def _test(case: CaseResult, *, allowed: bool) -> ElementTree.Element:
     }
     test = ElementTree.Element("testcase", attributes)
     if not missed:
+        if waived := case.record.waived:
+            message = f"{case.verdict}, {sentence_list(list(waived))} waived"
+            ElementTree.SubElement(test, "skipped", {"message": visible(message)})
         return test
     message = visible(" ".join(miss.message for miss in missed))
     tag = "error" if case.verdict == "indeterminate" else "failure"

@@ -40,6 +40,8 @@ def count_sentence(result: StudyResult) -> str:
     verbs = VERBS | {"refused": (_COMBINED, _COMBINED)}
     counts = result.counts
     parts = [f"{counts['meets']} of {len(result)} cases {verbs['meets'][counts['meets'] != 1]}"]
+    if result.waived:
+        parts[0] += f" ({result.waived} with waived ones missed)"
     parts += [f"{n} {verbs[word][n > 1]}" for word, n in counts.items() if n and word != "meets"]
     return sentence_list(parts)
 

@@ -21,13 +21,21 @@ from syncline_design.report.words import (
     TERMS,
 )
 from syncline_design.verdict.obstacle import obstacle_sentence
+from syncline_design.verdict.tree import waived_misses
 
 if TYPE_CHECKING:
     from syncline_design.verdict.named import NamedRole
     from syncline_design.verdict.optimization import Optimization
     from syncline_design.verdict.since import Baseline
     from syncline_design.verdict.syncline_figures import LedgerRow
-    from syncline_design.verdict.tree import Caution, Checked, RequirementResult, Status, Verdict
+    from syncline_design.verdict.tree import (
+        Caution,
+        Checked,
+        RequirementResult,
+        Status,
+        Verdict,
+        Word,
+    )
 
 
 SEEN_SHARE = 0.001  # of the total: smaller terms have no row
@@ -47,11 +55,21 @@ def outcome(verdict: Checked) -> Outcome:
     found = OUTCOMES[verdict.verdict]
     if verdict.verdict == "refused":
         return found
-    rows = verdict.requirements if verdict.verdict == "meets" else ()
-    if missed := [visible(row.id) for row in rows if row.status == "fail"]:
-        word = f"{found.word}, {sentence_list(missed)} waived"
-        found = replace(STATUSES["waived"], word=word)
+    found = with_waived(found, waived_of(verdict.verdict, verdict.requirements))
     return replace(found, word=found.word + qualification(verdict))
+
+
+def waived_of(word: Word, rows: Sequence[RequirementResult]) -> tuple[str, ...]:
+    """Ids of what a design misses that meets all the same."""
+    return waived_misses(rows) if word == "meets" else ()
+
+
+def with_waived(found: Outcome, ids: Sequence[str]) -> Outcome:
+    """An outcome in which missed requirements are waived: it says so, and is not a clean one."""
+    if not ids:
+        return found
+    names = sentence_list([visible(one) for one in ids])
+    return replace(STATUSES["waived"], word=f"{found.word}, {names} waived")
 
 
 def qualification(verdict: Verdict | Optimization) -> str:

@@ -116,6 +116,7 @@ class Case:
     catalog entry is defined; files: what was read besides.  Looked up as the case is made: stages,
     hardware (shared, of all that may be used, in the order of the catalogs) and effects (known).
     missions: of a spec that has them, each a case of its own; the spec itself is none of them.
+    eased: by id what a waived requirement is in the choice; None: left out.
     """
 
     spec: Spec
@@ -129,6 +130,7 @@ class Case:
     files: tuple[FileRead, ...] = ()
     trajectory: FileContent | None = None
     missions: tuple[Mission, ...] = ()
+    eased: Mapping[str, Fraction | None] = field(default_factory=dict)
     stages: tuple[StageCase, ...] = field(init=False, repr=False)
     hardware: Mapping[str, CandidateEntry[InfrastructureEntry]] = field(init=False, repr=False)
     effects: tuple[EffectEntry, ...] = field(init=False, repr=False)
@@ -153,6 +155,10 @@ class Case:
         if not isinstance(limit, Quantity):
             return Fraction(limit)
         return self.spec.in_currency(limit) if requirement.kind == "cost" else limit.exact
+
+    def choice_limit(self, requirement: Requirement) -> Fraction | None:
+        """What a design is chosen by: the limit, or what a waiver eases it to (None: nothing)."""
+        return self.eased.get(requirement.id, self.limit(requirement))
 
     def clocks(self, vehicle: str) -> tuple[CandidateEntry[ClockEntry], ...]:
         """Clock disciplines that a vehicle's host may have; its stages agree on them."""

@@ -79,23 +79,29 @@ class Finished:
         return (self.case(index) for index in range(len(self.keys)))
 
     @cached_property
-    def _ends(self) -> Counter[tuple[CaseWord, tuple[str, ...]]]:
-        """How often cases ended how, with what was not simulated: every record read once."""
+    def _ends(self) -> Counter[tuple[CaseWord, tuple[str, ...], bool]]:
+        """How often cases ended how, with what was not simulated, and whether a waiver was made use
+        of: every record read once."""
         records = map(self._record, range(len(self.keys)))
-        return Counter((one.verdict, one.not_simulated) for one in records)
+        return Counter((one.verdict, one.not_simulated, bool(one.waived)) for one in records)
 
     @cached_property
     def counts(self) -> dict[CaseWord, int]:
         """How many cases ended how."""
         found = dict.fromkeys(VERDICTS, 0)
-        for (word, _), count in self._ends.items():
+        for (word, *_), count in self._ends.items():
             found[word] += count
         return found
 
     @property
+    def waived(self) -> int:
+        """How many cases meet although a waived requirement is missed."""
+        return sum(count for (_, _, waived), count in self._ends.items() if waived)
+
+    @property
     def not_simulated(self) -> tuple[str, ...]:
         """Requirements that no case decided because the study leaves Monte Carlo out."""
-        return tuple(sorted({i for _, left_out in self._ends for i in left_out}))
+        return tuple(sorted({i for _, left_out, _ in self._ends for i in left_out}))
 
     @property
     def verdict(self) -> StudyWord:

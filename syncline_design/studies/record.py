@@ -13,7 +13,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 from syncline_design.studies.inputs import Inputs
 from syncline_design.verdict.named import NamedDesign
-from syncline_design.verdict.tree import FileProblem, RequirementResult
+from syncline_design.verdict.tree import FileProblem, RequirementResult, waived_misses
 
 SCHEMA = "syncline-design/study-case/v1"
 CaseWord = Literal["meets", "fails", "infeasible", "refused", "indeterminate"]
@@ -84,6 +84,11 @@ class CaseRecord(Record):
         return self.verdict != "meets" or (
             bool(self.requirements) and all(map(_holds, self.requirements))
         )
+
+    @property
+    def waived(self) -> tuple[str, ...]:
+        """Ids of requirements that a case misses which meets all the same."""
+        return waived_misses(self.requirements) if self.verdict == "meets" else ()
 
     @property
     def cost(self) -> float | None:

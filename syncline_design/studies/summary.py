@@ -28,6 +28,7 @@ class Brief:
     currency: str
     error_m: float | None
     picks: tuple[RolePick, ...]
+    waived: tuple[str, ...] = ()
 
     @property
     def meets(self) -> bool:
@@ -122,7 +123,7 @@ def _brief(case: CaseResult) -> Brief:
     record = case.record
     return Brief(
         case.number, case.base, tuple(case.labels.values()), record.verdict, record.cost,
-        case.currency, record.error_m, tuple(record.picks),
+        case.currency, record.error_m, tuple(record.picks), record.waived,
     )  # fmt: skip
 
 

@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field, replace
-from datetime import date
 from fractions import Fraction
 from typing import NoReturn
 
@@ -71,12 +70,10 @@ def refuse_trajectory(case: Case, message: str) -> NoReturn:
 class Simulations:
     """Decisions of one command, by what was simulated.
 
-    today: the day on which waivers are judged; a waived requirement decides nothing.
     kinds: of requirements that are judged design by design.
     """
 
     seed: int = 0
-    today: date | None = None
     kinds: tuple[str, ...] = JUDGED_KINDS
     most: int = MOST_SIMULATED
     known: dict[tuple[System, SimulationSettings, float, float], Decision] = field(
@@ -145,18 +142,14 @@ class Simulations:
 
     def problem_of(self, case: Case) -> Problem:
         """The design problem of a spec, its simulated requirements included."""
-        wanted = [r for r in case.spec.requirements if r.kind in self.kinds]
-        wanted = [r for r in wanted if not self._is_waived(r)]
+        wanted = tuple(r for r in case.spec.requirements if r.kind in self.kinds)
         problem = problem_of(case)
         self.asked = self.asked or case
-        if not wanted:
+        known = [(one.id, case.choice_limit(one)) for one in wanted]
+        limits = tuple((name, float(limit)) for name, limit in known if limit is not None)
+        if not limits:
             return problem
-        limits = tuple((r.id, float(r.limit)) for r in wanted)
-        return replace(problem, judge=_SpecJudge(self, case, tuple(wanted), limits, problem))
-
-    def _is_waived(self, requirement: Requirement) -> bool:
-        waiver = requirement.waiver
-        return waiver is not None and waiver.holds_on(self.today or date.today())
+        return replace(problem, judge=_SpecJudge(self, case, wanted, limits, problem))
 
 
 def _as_asked(table: RoleTable, option: Option) -> tuple[Fraction, Fraction]:
@@ -304,7 +297,8 @@ class _SpecJudge:
         self, system: System, name: str, limit_m: float, *, what_if: bool = False
     ) -> Decision:
         own = self._requirement(name)
-        moved = what_if or limit_m != float(own.limit)
+        asked = self.case.choice_limit(own)
+        moved = what_if or asked is None or limit_m != float(asked)
         quantile = float(own.quantile or 0.0)
         return self.simulations.decide(self.case, system, quantile, limit_m, what_if=moved)
 

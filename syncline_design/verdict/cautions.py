@@ -19,6 +19,7 @@ from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.verdict.cautions_of_facts import fact_cautions
 from syncline_design.verdict.cautions_of_owned import owned_cautions
+from syncline_design.verdict.cautions_of_waivers import waiver_cautions
 from syncline_design.verdict.tree import (
     Assumption,
     Caution,
@@ -43,7 +44,7 @@ def cautions(
     """The `warnings` of a verdict: a code to filter by, a sentence to read, what it is about."""
     return (
         *design_cautions(case, verified, figures),
-        *_waivers(verified),
+        *waiver_cautions(case, verified.requirements),
         *_simulation(verified),
         *_assumptions(assumed),
         *_transcripts(copied),
@@ -207,17 +208,6 @@ def _untyped(case: Case, verified: Verified) -> Iterator[Caution]:
                 "if it is a GNSS receiver it does not work there",
                 sensor.id,
                 "type",
-            )
-
-
-def _waivers(verified: Verified) -> Iterator[Caution]:
-    for row in verified.requirements:
-        if row.waiver is not None:
-            state = "expired on" if row.waiver.expired else "in force until"
-            yield Caution(
-                "waiver",
-                f"{row.id}: waiver {state} {row.waiver.expires}: {row.waiver.reason}",
-                requirement=row.id,
             )
 
 

@@ -90,11 +90,11 @@ def conflict_of(work: Work) -> tuple[tuple[FamilyLimit, ...], bool]:
     every = asked_of(work)
     active = list(every)
     try:
-        if _first(lifted(work, active)) is None:
+        if first_of(lifted(work, active)) is None:
             return (), False
         for one in every:
             absent = [other for other in every if other not in active or other == one]
-            if _first(lifted(work, absent)) is None:
+            if first_of(lifted(work, absent)) is None:
                 active.remove(one)
     except NoVerdict:
         return tuple(active), False
@@ -118,7 +118,8 @@ def _member(spec: Case, cases: dict[str, Case], one: FamilyLimit) -> ConflictMem
     return ConflictMember(one.part.id, one.part.kind, line, one.mission or None)
 
 
-def _first(work: Work) -> Chosen | None:
+def first_of(work: Work) -> Chosen | None:
+    """The first payload that meets a family; None where none does, or simulation leaves it open."""
     found = None if work.family.is_empty else choose_family(work)
     return None if found is None or found.undecided else found
 
@@ -154,7 +155,7 @@ def _least_amount(work: Work, one: FamilyLimit) -> Fraction | None:
     name = next(own for own in RESOURCES if own == one.part.kind)
     free = lifted(work, [one])
     problems = [replace(problem, objective=name) for problem in free.family.problems]
-    found = _first(with_problems(free, problems))
+    found = first_of(with_problems(free, problems))
     return None if found is None or found.found is None else found.found.sums.amount(name)
 
 
@@ -162,17 +163,17 @@ def _least_error(work: Work, one: FamilyLimit) -> Fraction | None:
     """By halving; what is found reaches less than it was asked for, and ends the search where
     nothing reaches less than it."""
     fails = min(_limit(own.problem, "accuracy") for own in _scenarios(work, one))
-    found = _first(lifted(work, [one]))
+    found = first_of(lifted(work, [one]))
     if found is None:
         return None
     works = _reached(work, one, found)
     for _ in range(STEPS):
-        below = _first(moved(work, {one: works * NEAR}))
+        below = first_of(moved(work, {one: works * NEAR}))
         if below is None:
             break
         works = _reached(work, one, below)
         middle = 0.5 * (works + fails)
-        halved = _first(moved(work, {one: middle}))
+        halved = first_of(moved(work, {one: middle}))
         if halved is None:
             fails = middle
         else:
@@ -193,7 +194,7 @@ def _reached(work: Work, one: FamilyLimit, found: Chosen) -> float:
 
 def _least_sync(work: Work, one: FamilyLimit) -> Fraction | None:
     def holds(limit: float) -> bool:
-        return _first(moved(work, {one: limit})) is not None
+        return first_of(moved(work, {one: limit})) is not None
 
     if not holds(math.inf):
         return None
@@ -223,7 +224,7 @@ def _proven(
         for move in moves:
             told.setdefault(fix_of(mission.case, move), []).append(mission.name)
         missions.append(replace(mission, case=with_moves(mission.case, moves)))
-    if len(told) != 1 or _first(_again(work, missions, build, seed)) is None:
+    if len(told) != 1 or first_of(again(work, missions, build, seed)) is None:
         return []
     fix, names = next(iter(told.items()))
     if not work.case.missions or len(names) == len(work.missions):
@@ -233,7 +234,7 @@ def _proven(
     return [replace(fix, mission=own, text=f"in mission {listed}: {fix.text}")]
 
 
-def _again(work: Work, missions: Sequence[Mission], build: Callable[[], Build], seed: int) -> Work:
+def again(work: Work, missions: Sequence[Mission], build: Callable[[], Build], seed: int) -> Work:
     """The family of changed missions."""
     if work.case.missions:
         return work_of(replace(work.case, missions=tuple(missions)), build, seed)
@@ -271,7 +272,7 @@ def _by_itself(mission: Mission, stage: int, role: Any) -> Mission:
 
 def _helps(work: Work, missions: Sequence[Mission], build: Callable[[], Build], seed: int) -> bool:
     try:
-        return _first(_again(work, missions, build, seed)) is not None
+        return first_of(again(work, missions, build, seed)) is not None
     except OutOfTime:
         raise
     except NoVerdict:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from syncline_design.choice.explain import listed, told
+from syncline_design.choice.explain import even_waived, listed, told
 from syncline_design.choice.outcome import Explanation, Fix
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Mission
+from syncline_design.verdict.cautions_of_waivers import waiver_cautions
 from syncline_design.verdict.family import ALL, Work, choose_family, work_of
 from syncline_design.verdict.family_choice import cannot_share
 from syncline_design.verdict.family_fixes import (
@@ -20,6 +21,7 @@ from syncline_design.verdict.family_fixes import (
     sharing_fixes,
 )
 from syncline_design.verdict.family_named import ruled_out_of
+from syncline_design.verdict.held import placed
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.no_design import LATE, infeasible_verdict, unmet
 from syncline_design.verdict.settings import CheckSettings
@@ -56,13 +58,21 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
     first = work.missions[0].case
     ids = {member.id for member in why.conflict.requirements}
     excluded, count = ruled_out_of(work)
+    unmet_rows = (
+        unmet(first, one, one.id in ids, why.conflict.minimal) for one in first.spec.requirements
+    )
+    rows = tuple(
+        replace(placed(first, i, one, row, settings), line=None, column=None)
+        for i, (one, row) in enumerate(zip(first.spec.requirements, unmet_rows, strict=True))
+    )
     return replace(
         framed("infeasible", work.case, work.scenarios[0].problem, settings.seed),
-        requirements=tuple(
-            replace(unmet(first, one, one.id in ids, why.conflict.minimal), line=None, column=None)
-            for one in first.spec.requirements
+        requirements=rows,
+        warnings=(
+            *((LATE,) if why.cut_short else ()),
+            NOT_TRIED,
+            *waiver_cautions(first, rows),
         ),
-        warnings=(*((LATE,) if why.cut_short else ()), NOT_TRIED),
         infeasibility=why,
         choice=ChoiceResult(excluded=excluded, excluded_count=count),
         missions=_without_design(work, None),
@@ -88,8 +98,9 @@ def _of_one(
         for first, *others in why.joint_fixes
     ]
     return told(replace(
-        why, about=f"Mission {name} alone:", missions=(name,), fixes=tuple(fixes),
-        joint_fixes=tuple(alone), cut_short=why.cut_short or bool(pieces.cut_short),
+        why, about=f"Mission {name} alone{even_waived(mission.case)}:", missions=(name,),
+        fixes=tuple(fixes), joint_fixes=tuple(alone),
+        cut_short=why.cut_short or bool(pieces.cut_short),
     ))  # fmt: skip
 
 
@@ -116,14 +127,14 @@ def _explained(work: Work, settings: CheckSettings, build: Callable[[], Build]) 
 
 def _about(work: Work, missions: Sequence[str]) -> str:
     """What no payload does."""
-    wanted = work.case.spec.choose_for
+    wanted, even = work.case.spec.choose_for, even_waived(work.missions[0].case)
     if missions:
-        return f"Each mission can be met alone, but {listed(missions)} not with one payload."
+        return f"Each mission can be met alone, but {listed(missions)} not with one payload{even}."
     if wanted == "nominal":
-        return "No payload meets every mission."
+        return f"No payload meets every mission{even}."
     how = "at both ends of every datasheet interval"
     how = how if isinstance(wanted, str) else f"with probability {wanted}"
-    return f"No payload holds {how}."
+    return f"No payload holds {how}{even}."
 
 
 def _rows_without_design(mission: Mission, found: Verdict) -> tuple[RequirementResult, ...]:

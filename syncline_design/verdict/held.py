@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from datetime import date
 from typing import TYPE_CHECKING
 
 from syncline_design.machine.deadline import OutOfTime
@@ -137,9 +136,8 @@ def placed(
     note = "; ".join(text for text in (requirement.note, result.note) if text)
     waiver = None
     if requirement.waiver is not None:
-        today = settings.today or date.today()
         given = requirement.waiver
-        waiver = WaiverResult(given.reason, given.expires, not given.holds_on(today))
+        waiver = WaiverResult(given.reason, given.expires, not given.holds_on(settings.day))
     return replace(
         result, line=line, column=column, note=note, waiver=waiver,
         limit_written=requirement.limit_written,

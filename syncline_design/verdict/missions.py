@@ -20,6 +20,7 @@ from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import Selection
 from syncline_design.verdict.cautions import unproven
+from syncline_design.verdict.cautions_of_waivers import waiver_cautions
 from syncline_design.verdict.family import (
     Chosen,
     Work,
@@ -31,6 +32,12 @@ from syncline_design.verdict.family_bill import bill_of, bought
 from syncline_design.verdict.family_choice import choice_of_family, robustness_of
 from syncline_design.verdict.family_infeasible import infeasible_family
 from syncline_design.verdict.family_named import Sums, ranked
+from syncline_design.verdict.family_waived import (
+    eased_anywhere,
+    eased_family,
+    lifted_family,
+    waived_of,
+)
 from syncline_design.verdict.likely import CONFIDENCE
 from syncline_design.verdict.mission_rows import (
     JudgedMission,
@@ -95,13 +102,28 @@ def judged_family(case: Case, settings: CheckSettings) -> FamilyOutcome:
                 names_candidates(one.case) for one in work.missions
             ):
                 return FamilyOutcome(found, work, pinned)
-        chosen = choose_family(work, settings.road) if pinned is None else None
+        work, chosen = _chosen(work, pinned, settings, build)
         if chosen is None:
             return FamilyOutcome(infeasible_family(work, settings, build), work)
         choice = ChoiceResult(proof=chosen.proof)
         return FamilyOutcome(_verdict_on(work, chosen, settings, build, choice), work, chosen)
     except OutOfTime as error:
         return FamilyOutcome(unfinished_verdict(case, None, settings, str(error)), work)
+
+
+def _chosen(
+    work: Work, pinned: Chosen | None, settings: CheckSettings, build: Callable[[], Build]
+) -> tuple[Work, Chosen | None]:
+    """The choice by every limit; where no payload keeps them all, with waived ones eased."""
+    chosen = choose_family(work, settings.road) if pinned is None else None
+    ids = waived_of(work, settings.day)
+    if chosen is not None or not ids:
+        return work, chosen
+    in_force().doing("choosing with what is waived")
+    eased = None if pinned is not None else eased_family(work, build, ids)
+    if eased is None:
+        return lifted_family(work, build, ids), None
+    return eased, choose_family(eased, settings.road)
 
 
 def _verdict_on(
@@ -277,6 +299,7 @@ def _assembled(
     design = shown.verdict.design
     assert design is not None
     several = bool(work.case.missions)
+    rows = family_rows(judged) if several else shown.rows
     made = framed(word, work.case, work.scenarios[0].problem, settings.seed)
     return replace(
         shown.verdict,
@@ -286,9 +309,12 @@ def _assembled(
         ),
         horizon=made.horizon,
         provenance=made.provenance,
-        requirements=family_rows(judged) if several else shown.rows,
+        requirements=rows,
         design=bought(design, [one.verdict.design for one in judged], sums, bill),
-        warnings=tuple(_warnings(judged, shown, several=several)),
+        warnings=(
+            *_warnings(judged, shown, several=several),
+            *waiver_cautions(eased_anywhere(work), rows),
+        ),
         choice=choice if choice.proof is not None else None,
         bill_of_materials=bill,
         missions=tuple(_mission_verdict(one) for one in judged) if several else None,
@@ -350,6 +376,8 @@ def _warnings(
     seen: dict[Caution, list[str]] = {}
     for one in judged:
         for caution in one.verdict.warnings:
+            if caution.code == "waiver":  # a mission's own sums are not those of the family
+                continue
             seen.setdefault(caution, []).append(one.mission.name)
     for caution, names in seen.items():
         if not several or len(names) == len(judged):

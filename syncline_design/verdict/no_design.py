@@ -11,6 +11,7 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import Requirement
 from syncline_design.verdict.cautions_of_facts import implausible_cautions
+from syncline_design.verdict.cautions_of_waivers import waiver_cautions
 from syncline_design.verdict.choice_data import without_choice
 from syncline_design.verdict.held import placed
 from syncline_design.verdict.named import ChoiceResult
@@ -49,21 +50,30 @@ def unfinished_verdict(
 def infeasible_verdict(
     case: Case, problem: Problem, settings: CheckSettings, build: Build
 ) -> Verdict:
-    """Why there is no design, and which single changes would help."""
+    """Why there is no design, and which single changes would help, whatever is waived aside."""
     # late: 33 ms that a spec with a design need not wait
     from syncline_design.choice.explain import explain
+    from syncline_design.choice.waivers import lifted, waived
     from syncline_design.verdict.nearest import nearest
 
+    if not case.eased and (ids := waived(case, settings.day)):
+        case = lifted(case, ids)
+        problem = build(case)
     found = explain(case, problem, build)
     conflict = {member.id for members in found.conflicts for member in members}
     minimal = found.conflict.minimal
+    rows = tuple(
+        placed(case, i, one, unmet(case, one, one.id in conflict, minimal), settings)
+        for i, one in enumerate(case.spec.requirements)
+    )
     return replace(
         framed("infeasible", case, problem, settings.seed),
-        requirements=tuple(
-            placed(case, i, one, unmet(case, one, one.id in conflict, minimal), settings)
-            for i, one in enumerate(case.spec.requirements)
+        requirements=rows,
+        warnings=(
+            *((LATE,) if found.cut_short else ()),
+            *waiver_cautions(case, rows),
+            *implausible_cautions(case),
         ),
-        warnings=(*((LATE,) if found.cut_short else ()), *implausible_cautions(case)),
         infeasibility=found,
         nearest=None if settings.brief else nearest(case, problem, found, build),
         choice=without_choice(problem),

@@ -81,7 +81,8 @@ class Optimization(Record):
     a search that found no design; front: with `--pareto`, `front_left_out` what has no place on
     it, `front_figure` over which figure of the error it is drawn, in words; slack, tolerances,
     measure_next: of a design that meets, null where that was not worked out; why_not: of the
-    entries that were asked about; alternatives, bargains: as in a verdict.
+    entries that were asked about; alternatives, bargains: as in a verdict; waived: ids of
+    requirements that the first design misses under a waiver.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -106,6 +107,7 @@ class Optimization(Record):
     measure_next: tuple[Measurement, ...] | None = optional()
     infeasibility: Explanation | None = optional()
     nearest: Nearest | None = optional()
+    waived: tuple[str, ...] | None = optional()
     why_not: tuple[Answer, ...] | None = optional()
     alternatives: tuple[Alternative, ...] | None = optional()
     bargains: tuple[Bargain, ...] | None = optional()

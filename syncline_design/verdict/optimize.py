@@ -29,8 +29,10 @@ from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case
 from syncline_design.spec.references import names_candidates
 from syncline_design.verdict.acceptance import Simulations
+from syncline_design.verdict.admitted import Kinds
 from syncline_design.verdict.alternatives import alternatives, bargains
 from syncline_design.verdict.cautions import design_cautions
+from syncline_design.verdict.cautions_of_waivers import waiver_cautions
 from syncline_design.verdict.choice_data import (
     front_designs,
     left_out,
@@ -44,8 +46,7 @@ from syncline_design.verdict.figure_front import (
 )
 from syncline_design.verdict.nearest import nearest
 from syncline_design.verdict.no_design import unfinished_verdict
-from syncline_design.verdict.one_design import verify
-from syncline_design.verdict.open_choice import Picked, pick
+from syncline_design.verdict.open_choice import Picked, chosen_of, pick
 from syncline_design.verdict.optimization import (
     NO_TABLES,
     Hinged,
@@ -57,7 +58,7 @@ from syncline_design.verdict.optimization import (
 from syncline_design.verdict.optimize_family import optimize_family
 from syncline_design.verdict.scenarios import is_family
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import Caution, Word
+from syncline_design.verdict.tree import Caution, Word, waived_misses
 from syncline_design.verdict.verified import Verified, error_figures
 from syncline_design.verdict.verify import open_verdict
 from syncline_design.verdict.why_not import AskedSpec, questions_of, why_not
@@ -68,7 +69,6 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimized:
     if is_family(case):
         return optimize_family(case, settings)
     questions = questions_of(case, settings.why_not)
-    build = Simulations(settings.seed).problem_of
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
         settings.seed,
@@ -78,15 +78,28 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimized:
     )
     problem = NO_TABLES
     try:
+        build = _fresh(settings)
         problem = build(case)
         in_force().doing("choosing")
-        picked = pick(
-            problem,
-            settings.road,
-            lambda design: verify(case, problem, design, checking),
-        )
+        builds = (build, lambda: _fresh(settings))
+        picked = pick(chosen_of(case, problem, builds, settings.road, checking.day), checking)
     except OutOfTime as error:
         return _unfinished(case, problem, settings, checking, str(error))
+    return _told(picked, settings, checking, questions)
+
+
+def _fresh(settings: OptimizeSettings) -> Build:
+    return Simulations(settings.seed).problem_of
+
+
+def _told(
+    picked: Picked,
+    settings: OptimizeSettings,
+    checking: CheckSettings,
+    questions: tuple[Case, Kinds],
+) -> Optimized:
+    """Everything that is asked about a choice."""
+    case, problem, build = picked.chosen.case, picked.chosen.problem, picked.chosen.build
     pieces = Pieces(lambda: refusals(problem))
     points = _points(case, problem, settings, pieces)
     designs: tuple[Design, ...] = ()
@@ -101,7 +114,8 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimized:
             result = _with_hinges(result, (case, problem, designs[0], build), pieces)
             result = _with_others(result, case, problem, designs[0], settings, points, pieces)
     if settings.why_not:
-        asked = AskedSpec(case, problem, designs[0] if designs else None, build, questions[0])
+        whole = replace(questions[0], eased=case.eased)
+        asked = AskedSpec(case, problem, designs[0] if designs else None, build, whole)
         answers = tuple(pieces.listed("why not", lambda: why_not(asked, questions[1])))
         result = replace(result, why_not=answers)
     result = replace(
@@ -109,6 +123,7 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimized:
         verdict=word,
         designs=ranked_designs(case, problem, designs, folded=not settings.every),
         warnings=_cautions(case, picked.verified, settings) if designs else (),
+        waived=_waived(picked.verified) if word == "meets" else None,
         cut_short=tuple(pieces.cut_short),
         gave_up=tuple(pieces.gave_up),
     )
@@ -118,7 +133,11 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimized:
         return found
     of_error = settings.pareto and settings.resource == "cost" and settings.figure is None
     of_cost = points if of_error else None
-    return replace(found, verdict=open_verdict(case, problem, picked, checking, points=of_cost))
+    return replace(found, verdict=open_verdict(picked, checking, of_cost))
+
+
+def _waived(verified: Verified | None) -> tuple[str, ...] | None:
+    return None if verified is None else waived_misses(verified.requirements) or None
 
 
 def _cautions(
@@ -127,7 +146,9 @@ def _cautions(
     """What a reader has to know of the best design."""
     if verified is None:
         return ()
-    return design_cautions(case, verified, error_figures(verified, settings.seed, statistics=True))
+    figures = error_figures(verified, settings.seed, statistics=True)
+    waivers = waiver_cautions(case, verified.requirements)
+    return (*design_cautions(case, verified, figures), *waivers)
 
 
 def _unfinished(

@@ -49,7 +49,7 @@ from syncline_design.verdict.optimization import (
 )
 from syncline_design.verdict.pinned import pinned_role
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import Caution, Verdict
+from syncline_design.verdict.tree import Caution, Verdict, waived_misses
 from syncline_design.verdict.why_not import Answer, questions_of
 
 Front = tuple[tuple[FrontDesign, ...], tuple[PriceStep, ...]]
@@ -110,6 +110,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimized:
         front_left_out=front and front_left_out(work, settings.resource),
         staircase=front and front[1],
         why_not=answers,
+        waived=waived_misses(verdict.requirements) or None if verdict.verdict == "meets" else None,
     )
     result = with_hinges(result, hinges)
     text = _pinned_text(work, found) if designs and found is not None else None

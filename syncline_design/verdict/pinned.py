@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from datetime import date
+
 from syncline_design.choice.outcome import Infeasible
 from syncline_design.choice.problem import build_problem, selection_of, sole_design
 from syncline_design.choice.table import Design, Problem
+from syncline_design.choice.variations import Build
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
+from syncline_design.verdict.open_choice import chosen_of
 from syncline_design.verdict.scenarios import refuse_missions
 
 
@@ -62,17 +66,20 @@ def picked_design(case: Case, seed: int) -> tuple[Problem, Design]:
     By its figures as given, whatever it is chosen for.
     """
     refuse_missions(case)
-    problem = Simulations(seed).problem_of(case)
+
+    def fresh() -> Build:
+        return Simulations(seed).problem_of
+
+    build = fresh()
+    problem = build(case)
     sole = sole_design(problem)
     if sole is not None:
         return sole
-    from syncline_design.choice.decide import choose  # 17 ms that a pinned spec need not wait
-
-    choice = choose(problem)
-    if isinstance(choice, Infeasible):
+    chosen = chosen_of(case, problem, (build, fresh), "auto", date.today())
+    if isinstance(chosen.choice, Infeasible):
         line, column = case.positions.get(("stages",), (0, 0))
         message = "no design meets this spec, so there is no system to work with"
         hint = f"see `syncline-design check {case.path.name}`, or pin the sensors"
         place = (str(case.path), line, column, "stages")
         raise BadInput((Flaw(*place, message, hint=hint),))
-    return problem, choice.design
+    return chosen.problem, chosen.choice.design

@@ -35,8 +35,13 @@ class CheckSettings:
     others: bool = True
     brief: bool = False
 
+    @property
+    def day(self) -> date:
+        """The day on which waivers are judged."""
+        return self.today or date.today()
+
 
 def build_of(settings: CheckSettings) -> Build:
     """How a spec becomes a problem: with simulated requirements, unless nothing is simulated."""
     kinds = JUDGED_KINDS if settings.monte_carlo else STATED_KINDS
-    return Simulations(settings.seed, settings.today, kinds).problem_of
+    return Simulations(settings.seed, kinds).problem_of

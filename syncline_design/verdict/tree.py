@@ -117,10 +117,17 @@ def word_of(results: Iterable[RequirementResult]) -> Word:
 
     A failure with a valid waiver does not count.
     """
-    statuses = {r.status for r in results if not (r.status == "fail" and r.is_waived)}
+    rows = list(results)
+    waived = waived_misses(rows)
+    statuses = {r.status for r in rows if r.id not in waived}
     if "fail" in statuses:
         return "fails"
     return "indeterminate" if "indeterminate" in statuses else "meets"
+
+
+def waived_misses(results: Iterable[RequirementResult]) -> tuple[str, ...]:
+    """Ids of requirements that are missed and do not count, by a waiver in force."""
+    return tuple(row.id for row in results if row.status == "fail" and row.is_waived)
 
 
 @dataclass(frozen=True, slots=True)

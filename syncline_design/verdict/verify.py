@@ -21,7 +21,7 @@ from syncline_design.verdict.choice_data import choice_of, left_out_text, withou
 from syncline_design.verdict.cloud import cloud
 from syncline_design.verdict.no_design import infeasible_verdict, unfinished_verdict
 from syncline_design.verdict.one_design import verdict_on, verify
-from syncline_design.verdict.open_choice import Picked, pick
+from syncline_design.verdict.open_choice import Picked, chosen_of, pick
 from syncline_design.verdict.scenarios import is_family
 from syncline_design.verdict.settings import CheckSettings, build_of
 from syncline_design.verdict.tree import (
@@ -94,24 +94,16 @@ def _sole_verdict(case: Case, problem: Problem, settings: CheckSettings, build: 
 
 def _check_open(case: Case, problem: Problem, settings: CheckSettings, build: Build) -> Verdict:
     """Choose, then verify; without any design say why and what would help."""
-    picked = pick(
-        problem,
-        settings.road,
-        lambda design: verify(case, problem, design, settings),
-    )
-    return open_verdict(case, problem, picked, settings, build)
+    builds = (build, lambda: build_of(settings))
+    chosen = chosen_of(case, problem, builds, settings.road, settings.day)
+    return open_verdict(pick(chosen, settings), settings)
 
 
 def open_verdict(
-    case: Case,
-    problem: Problem,
-    picked: Picked,
-    settings: CheckSettings,
-    build: Build | None = None,
-    points: Sequence[FrontPoint] | None = None,
+    picked: Picked, settings: CheckSettings, points: Sequence[FrontPoint] | None = None
 ) -> Verdict:
     """The verdict on what was picked for a spec; points: its front of cost, where known."""
-    build = build or build_of(settings)
+    case, problem, build = picked.chosen.case, picked.chosen.problem, picked.chosen.build
     if sole_design(problem) is not None:
         return _sole_verdict(case, problem, settings, build)
     if picked.verified is None:
