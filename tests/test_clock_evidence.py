@@ -354,6 +354,8 @@ def _spoiled(folder: Path, name: str) -> list[Path]:
         rows = [[t, 1e3 * x] for t, x in rows]
     elif name == "ns from the middle on":
         rows = [[t, x * (1e3 if k > 150 else 1.0)] for k, (t, x) in enumerate(rows)]
+    elif name == "ns at the end":
+        rows = [[t, x * (1e3 if k > 275 else 1.0)] for k, (t, x) in enumerate(rows)]
     elif name == "stuck":
         rows = [[t, rows[0][1]] for t, _ in rows]
     elif name == "us as s":
@@ -370,6 +372,7 @@ DOUBTS = {
     "TAI": "TAI against UTC (37 s)",
     "ns as us": "are the units the same?",
     "ns from the middle on": "does another unit begin there?",
+    "ns at the end": "does another unit begin there?",
     "us as s": "is that the unit",
     "stuck": "the offset never changes",
 }
@@ -390,7 +393,7 @@ def test_logs_in_doubt_carry_no_claim_and_nothing_is_written(name: str, tmp_path
     assert study_logs(_spoiled(tmp_path, "nothing"), TimingSettings()).timing.doubts == ()
 
 
-@pytest.mark.parametrize("what", ["step", "bad start", "settling"])
+@pytest.mark.parametrize("what", ["step", "bad start", "settling", "noisy start", "noisy minutes"])
 def test_a_clock_that_is_a_thousand_times_worse_for_a_while_is_no_change_of_unit(
     what: str, tmp_path: Path
 ) -> None:
@@ -401,7 +404,9 @@ def test_a_clock_that_is_a_thousand_times_worse_for_a_while_is_no_change_of_unit
     if what == "bad start":
         times = times + later * 86_400.0
     extra = {"step": 1e-3 * later, "bad start": 1e-3 * later,
-             "settling": 1e-3 * np.exp(-np.arange(600) / 60.0)}[what]  # fmt: skip
+             "settling": 1e-3 * np.exp(-np.arange(600) / 60.0),
+             "noisy start": 1e3 * noise * (np.arange(600) < 20),
+             "noisy minutes": 1e3 * noise * (np.abs(np.arange(600) - 300) < 10)}[what]  # fmt: skip
     log = write(tmp_path / "a.csv", made.csv_lines(times, 1e-6 + noise + extra))
     assert study_logs([log], TimingSettings()).timing.doubts == ()
 

@@ -209,6 +209,55 @@ def test_a_session_on_another_time_base_is_that_session(
         read_logs([first, again])
 
 
+@pytest.mark.parametrize("how", ["between", "midway", "slower", "pairs", "eights"])
+@pytest.mark.parametrize("clock", ["white", "slow"])
+def test_a_session_resampled_is_that_session(clock: str, how: str, tmp_path: Path) -> None:
+    """Read between its rows, or averaged: no stamp comes back, and no offset does."""
+    rng = np.random.default_rng(17)
+    times = START + 16.0 * np.arange(1600)
+    noise = rng.standard_normal(1600)
+    late = 1e-5 * (noise if clock == "white" else np.cumsum(noise) / 10.0)
+    first = write(tmp_path / "a.csv", _table("us", times, late, 1e6, 3))
+    if how in ("pairs", "eights"):
+        count = {"pairs": 2, "eights": 8}[how]
+        stamps, values = (x.reshape(-1, count).mean(axis=1) for x in (times, late))
+    else:
+        stamps = {"between": times + 3.0, "midway": times + 8.0,
+                  "slower": START + 25.0 * np.arange(1000)}[how]  # fmt: skip
+        values = np.interp(stamps, times, late)
+    again = write(tmp_path / "b.csv", _table("us", stamps, values, 1e6, 3))
+    for pair in ([first, again], [again, first]):
+        with pytest.raises(BadInput, match="the same session as in"):
+            read_logs(pair)
+
+
+@pytest.mark.parametrize(("stride", "phase"), [(2, 0), (2, 1), (5, 3)])
+def test_each_second_row_from_its_own_start_is_that_session(
+    stride: int, phase: int, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(19)
+    times = START + 16.0 * np.arange(400)
+    late = 1e-5 * rng.standard_normal(400)
+    first = write(tmp_path / "a.csv", _table("us", times, late, 1e6, 3))
+    kept = slice(phase, None, stride)
+    again = write(tmp_path / "b.csv", _table("ns", times[kept] - times[phase], late[kept], 1e9, 0))
+    for pair in ([first, again], [again, first]):
+        with pytest.raises(BadInput, match="follow one another as there, stamped from another"):
+            read_logs(pair)
+
+
+@pytest.mark.parametrize("later_s", [0.0, 4.0])
+def test_two_clocks_left_alone_are_not_one_session(later_s: float, tmp_path: Path) -> None:
+    """Both drift, by 20 and by 30 ppm: that is no more alike than two straight lines are."""
+    rng = np.random.default_rng(23)
+    times = START + 10.0 * np.arange(2000)
+    logs = []
+    for k, rate in enumerate((2e-5, 3e-5)):
+        late = rate * 10.0 * np.arange(2000) + 1e-6 * rng.standard_normal(2000)
+        logs.append(write(tmp_path / f"{k}.csv", _table("us", times + k * later_s, late, 1e6, 1)))
+    assert len(read_logs(logs).series) == 2
+
+
 @pytest.mark.parametrize("kind", ["few levels", "ramp", "noise"])
 def test_sessions_that_are_alike_are_not_one(kind: str, tmp_path: Path) -> None:
     """Offsets of a few nanoseconds, a steady drift, or noise about one bias: 20 days of each."""

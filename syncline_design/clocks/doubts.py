@@ -18,6 +18,9 @@ WHOLE_STEP_S: Final = 0.5
 _LARGEST_S, _SMALLEST_S = 0.5, 1e-11
 _THOUSANDS: Final = (1e3, 1e6, 1e9)
 _BLOCK, _FEWEST_BLOCKS = 10, 3  # samples of a block, blocks of either unit
+_LAST_BLOCKS: Final = (
+    2  # of the larger unit where it lasts to the file's end: no start, nor a while
+)
 
 
 def doubts(series: Sequence[ClockSeries], sessions: Sequence[ClockSession]) -> tuple[str, ...]:
@@ -145,13 +148,18 @@ def _blocks(session: ClockSession) -> Array:
 
 
 def _gap(level: Array) -> float | None:
-    """The lower edge of the widest empty factor between two groups of levels, if beyond 100."""
+    """The lower edge of the widest empty factor between two groups of levels, if beyond 100.
+
+    A start settles and a disturbance passes within few blocks; a unit lasts to the file's end.
+    """
     ordered = np.sort(level[level > 0.0])
-    if ordered.shape[0] < 2 * _FEWEST_BLOCKS:
+    if ordered.shape[0] < _FEWEST_BLOCKS + _LAST_BLOCKS:
         return None
     factors = ordered[1:] / ordered[:-1]
     k = int(np.argmax(factors))
-    few = min(k + 1, ordered.shape[0] - k - 1) < _FEWEST_BLOCKS
+    small, large = k + 1, ordered.shape[0] - k - 1
+    lasts = large >= _LAST_BLOCKS and bool(np.all(level[-large:] > ordered[k]))
+    few = small < _FEWEST_BLOCKS or (large < _FEWEST_BLOCKS and not lasts)
     return None if few or factors[k] <= 100.0 else float(ordered[k])
 
 

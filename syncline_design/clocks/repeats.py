@@ -16,6 +16,7 @@ from syncline_design.clocks.files import refused
 from syncline_design.clocks.series import Array, ClockSeries
 from syncline_design.model.figure_text import format_duration
 
+Rows = tuple[Array, Array]  # stamps and offsets [s]
 _HINT: Final = "a session counts once: give each once"
 _FEWEST: Final = 10  # rows whose offsets can be told to move alike
 _SAME_STAMP: Final = 0.05  # of the usual time between rows: what an export rounds off
@@ -24,7 +25,15 @@ _ROUNDED: Final = 0.95  # share of rows that differ by no more than the coarser 
 _FINEST_S: Final = 1e-15  # below it offsets differ by arithmetic alone
 _PROBE: Final = 12  # rows in a row by which one log is looked for in another
 _LEVELS: Final = 6  # steps that these take: fewer come back by chance, or by a drift
+_THINNED: Final = 10  # an export that keeps each tenth row is still looked for
 _DAY_S: Final = 86400.0  # zones are less apart
+_BIN: Final = 8  # rows of the sparser log: their mean hardly depends on where they were taken
+_FEWEST_BINS: Final = 20
+_BINS_ALIKE: Final = 0.9  # correlation of second differences of such means, free of a common day
+_BETWEEN: Final = (
+    0.97  # correlation of second differences of rows, read between the other log's rows
+)
+_FEWEST_BETWEEN: Final = 30
 _STARTS: Final = (0.0, 0.35, 0.7)  # shares of a log at which such rows begin
 
 
@@ -49,6 +58,11 @@ def demand_once(series: Sequence[ClockSeries]) -> None:
                               found=f"{twice} rows of {one.kind.name} with the same stamps, whose "
                               "offsets are the same but for unit or rounding",
                               hint=_HINT)  # fmt: skip
+            if _resampled(one, other):
+                raise refused(Path(one.files[0]), f"the same session as in {other.files[0]}",
+                              found=f"{len(one)} rows of {one.kind.name} at the same time, whose "
+                              "offsets move as there: resampled, or averaged",
+                              hint=_HINT)  # fmt: skip
         if len(one.files) > 1 and len(one) - np.unique(rows).shape[0] > most:
             raise refused(Path(one.files[-1]), f"the same session as in {one.files[0]}",
                           found="rows with the same stamp and offset", hint=_HINT)  # fmt: skip
@@ -67,15 +81,24 @@ def _demand_apart(one: ClockSeries, other: ClockSeries, most: int) -> None:
 
 def _elsewhere(one: ClockSeries, other: ClockSeries) -> tuple[int, float]:
     """How many rows of one log another one holds at other stamps, and by how much later [s]."""
+    rows, later_s = _held(one, other)
+    if rows:
+        return rows, later_s
+    rows, earlier_s = _held(other, one)
+    return rows, -earlier_s
+
+
+def _held(one: ClockSeries, other: ClockSeries) -> tuple[int, float]:
+    """As `_elsewhere`, where each row of one, or each second, third ... of other is one of one."""
     own, others = one.offset_s, other.offset_s
     coarser = max(_resolution(own[np.isfinite(own)]), _resolution(others[np.isfinite(others)]))
     least = 0.51 * coarser + _FINEST_S
     for sign in (1.0, -1.0):
-        for moved in _places(own, sign * others, least):
-            first, last = max(0, -moved), min(len(one), len(other) - moved)
-            there = slice(first + moved, last + moved)
-            near = np.abs(own[first:last] - sign * others[there]) <= least
-            later = one.time_s[first:last] - other.time_s[there]
+        for first, stride in _places(own, sign * others, least):
+            there = first + stride * np.arange(len(one))
+            inside = (there >= 0) & (there < len(other))
+            near = np.abs(own[inside] - sign * others[there[inside]]) <= least
+            later = one.time_s[inside] - other.time_s[there[inside]]
             later_s, step = float(np.median(later)), float(np.median(np.diff(one.time_s)))
             near &= np.abs(later - later_s) <= 0.5 * step
             if float(np.mean(near)) > _ROUNDED and abs(later_s) > _SAME_STAMP * step:
@@ -83,17 +106,19 @@ def _elsewhere(one: ClockSeries, other: ClockSeries) -> tuple[int, float]:
     return 0, 0.0
 
 
-def _places(own: Array, others: Array, least: float) -> Iterator[int]:
-    """By how many rows others' offsets come later, where some of one's follow one another there."""
+def _places(own: Array, others: Array, least: float) -> Iterator[tuple[int, int]]:
+    """Where some of one's rows follow one another in others: the first row's place, the stride."""
     for share in _STARTS:
         begin = int(share * own.shape[0])
         probe = own[begin : begin + _PROBE]
         if probe.shape[0] < _PROBE or np.unique(np.round(np.diff(probe) / least)).size < _LEVELS:
             continue
-        at = np.arange(others.shape[0] - _PROBE + 1)
-        for k, value in enumerate(probe):
-            at = at[np.abs(others[at + k] - value) <= least]
-        yield from (int(where) - begin for where in at[:1])
+        begun = np.flatnonzero(np.abs(others - probe[0]) <= least)
+        for stride in range(1, _THINNED + 1):
+            at = begun[begun + stride * (_PROBE - 1) < others.shape[0]]
+            for k, value in enumerate(probe):
+                at = at[np.abs(others[at + k * stride] - value) <= least]
+            yield from ((int(where) - begin * stride, stride) for where in at[:1])
 
 
 def _apart(one: ClockSeries, other: ClockSeries) -> bool:
@@ -117,10 +142,68 @@ def _followed(one: ClockSeries, other: ClockSeries) -> int:
     near = np.abs(own - others) <= 0.51 * coarser + _FINEST_S
     if float(np.mean(near)) > _ROUNDED:
         return int(own.shape[0])
-    steps, others_steps = np.diff(own), np.diff(others)
-    size = float(np.linalg.norm(steps) * np.linalg.norm(others_steps))
-    alike = size > 0.0 and abs(float(steps @ others_steps)) > _ALIKE * size
-    return int(own.shape[0]) if alike else 0
+    return int(own.shape[0]) if _correlation(np.diff(own), np.diff(others)) > _ALIKE else 0
+
+
+def _correlation(own: Array, others: Array) -> float:
+    """|correlation| about the means: two clocks left alone both drift; 0 where one never moves."""
+    own, others = own - np.mean(own), others - np.mean(others)
+    size = float(np.linalg.norm(own) * np.linalg.norm(others))
+    return abs(float(own @ others)) / size if size > 0.0 else 0.0
+
+
+def _resampled(one: ClockSeries, other: ClockSeries) -> bool:
+    """Whether one log tells at its own stamps what the other told at others: of one clock, then."""
+    if one.kind.stamps != "utc":
+        return False
+    apart_s = max(float(np.median(np.diff(log.time_s))) if len(log) > 1 else 0.0
+                  for log in (one, other))  # fmt: skip
+    logs = (_known(one), _known(other))
+    return apart_s > 0.0 and (
+        _moves_between(*logs) or _moves_between(*logs[::-1])
+        or _averages_alike(logs, _BIN * apart_s)
+    )  # fmt: skip
+
+
+def _moves_between(one: Rows, other: Rows) -> bool:
+    """Whether one's rows are what is read between other's rows."""
+    times, offsets = one
+    if not other[0].shape[0]:
+        return False
+    inside = (times >= other[0][0]) & (times <= other[0][-1])
+    if int(np.sum(inside)) < _FEWEST_BETWEEN:
+        return False
+    read = np.interp(times[inside], *other)
+    return _correlation(np.diff(offsets[inside], 2), np.diff(read, 2)) > _BETWEEN
+
+
+def _averages_alike(logs: tuple[Rows, Rows], bin_s: float) -> bool:
+    """Whether means over the same stretches of time bend alike."""
+    if not all(times.shape[0] for times, _ in logs):
+        return False
+    begin, end = max(t[0] for t, _ in logs), min(t[-1] for t, _ in logs)
+    count = int((end - begin) / bin_s)
+    if count < _FEWEST_BINS:
+        return False
+    edges = begin + bin_s * np.arange(count + 1)
+    own, others = (_bends(log, edges) for log in logs)
+    return _correlation(own, others) > _BINS_ALIKE
+
+
+def _bends(log: tuple[Array, Array], edges: Array) -> Array:
+    """Second differences of the means between edges, brought to the middles: without a drift."""
+    rows, _ = np.histogram(log[0], edges)
+    full = rows > 0
+    times, means = (np.histogram(log[0], edges, weights=x)[0][full] / rows[full] for x in log)
+    found: Array = np.diff(np.interp(0.5 * (edges[:-1] + edges[1:]), times, means), 2)
+    return found
+
+
+def _known(log: ClockSeries) -> Rows:
+    """Stamps and offsets [s] of the rows that have one, in the order of time."""
+    order = np.argsort(log.time_s, kind="stable")
+    order = order[np.isfinite(log.offset_s[order])]
+    return log.time_s[order], log.offset_s[order]
 
 
 def _at_one_time(one: ClockSeries, other: ClockSeries) -> tuple[Array, Array]:
