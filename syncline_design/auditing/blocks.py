@@ -16,6 +16,7 @@ LOW: Final = 25.0  # per cent
 _GAP: Final = 3.0  # of the usual length: a block with a gap in it lies nowhere
 _BACKLOG: Final = 0.3  # of the usual length
 _STEEP: Final = 1.0  # of the spread: how much a course may rise within a block
+_CUBIC, _FLATTER = 4, 0.5  # parameters; of the spread before
 LOADED_FEW: Final = 7.0  # over the messages of a block: how much more chance alone gives few
 LOADED: Final = 1.7  # a spread so many times the usual: the host is busy, delays are longer
 
@@ -44,7 +45,7 @@ class Blocks:
 
 
 def blocks_of(time_s: Array, late_s: Array) -> Blocks | None:
-    """Blocks of equal numbers of messages; None where there are too few."""
+    """Blocks of equal numbers of messages; None where there are too few, or most came at once."""
     least = LEAST_MESSAGES if time_s.size >= FEW else LEAST_OF_FEW
     count = min(MOST_BLOCKS, time_s.size // least)
     if count < 8:
@@ -55,6 +56,8 @@ def blocks_of(time_s: Array, late_s: Array) -> Blocks | None:
         part = slice(edges[k], edges[k + 1])
         middle[k] = float(time_s[part].mean())
         low[k], width[k] = _level(time_s[part] - middle[k], late_s[part])
+    if float(np.median(np.diff(middle))) <= 0.0:
+        return None
     usual = float(np.median(width))
     loaded = LOADED + LOADED_FEW * count / time_s.size
     span = time_s[edges[1:] - 1] - time_s[edges[:-1]]
@@ -68,7 +71,8 @@ def blocks_of(time_s: Array, late_s: Array) -> Blocks | None:
 def _level(time_s: Array, late_s: Array) -> tuple[float, float]:
     """(low quantile, spread) of a block; a steep course within it is taken off first.
 
-    The spread is that of neighbours' differences over sqrt(2), which no course enters.
+    The spread is that of neighbours' differences over sqrt(2), which no even course enters; a
+    steep one, as of what settles within some blocks, is taken off as a cubic.
     """
     width = spread(np.diff(late_s)) / float(np.sqrt(2.0))
     half = late_s.size // 2
@@ -76,7 +80,22 @@ def _level(time_s: Array, late_s: Array) -> tuple[float, float]:
     run = float(np.median(time_s[half:]) - np.median(time_s[:half]))
     if run > 0.25 * float(time_s[-1] - time_s[0]) and abs(rise) > _STEEP * width:
         late_s = late_s - time_s * rise / run
+        if late_s.size >= LEAST_MESSAGES:
+            late_s, width = _without_cubic(time_s, late_s, width)
     return float(np.percentile(late_s, LOW)), width
+
+
+def _without_cubic(time_s: Array, late_s: Array, width: float) -> tuple[Array, float]:
+    """Without a course of third order but for its value in the middle, and the spread of what is
+    left; as it was where that is no less spread."""
+    scaled = time_s / float(np.ptp(time_s))
+    powers = np.stack([scaled**k for k in range(_CUBIC)], axis=1)
+    course = np.asarray(powers @ np.linalg.lstsq(powers, late_s, rcond=None)[0])
+    left = late_s - course
+    own = spread(np.diff(left)) / float(np.sqrt(2.0 * (1.0 - _CUBIC / left.size)))
+    if own > _FLATTER * width:
+        return late_s, width
+    return np.asarray(left + np.interp(0.0, time_s, course)), own
 
 
 def _calm(usable: Mask) -> Mask:

@@ -37,6 +37,7 @@ _ALIKE: Final = 0.8  # of the falls, of a range that has no name
 _NEAR: Final = 1e-3  # of a range: how far from its name what was measured may be
 _WITHIN: Final = 0.3  # of a range: falls that are taken for the same
 _EVEN: Final = 0.35
+_OFTEN: Final = 0.2  # of an interval
 _AROUND: Final = 20
 _BINS: Final = 10
 _COHERENT: Final = 0.6
@@ -78,32 +79,62 @@ def unwrapped(series: Series) -> Continuous:
     falls = np.flatnonzero(change < 0)
     if not falls.size:
         return Continuous(series)
-    if falls.size > _ALIASED * change.size:
-        return _aliased(series, places, stamp)
     expected, even = _expected(series, places, change)
+    if falls.size > _ALIASED * change.size and not (even and _as_often(series, places, change)):
+        return _aliased(series, places, stamp)
+    period = float(np.median(change[change > 0])) if bool(np.any(change > 0)) else 0.0
     fallen = (expected - change)[falls]
     levels = _by_levels(series, places, falls, fallen)
     if not even:
         fallen = levels
     elif series.receive is not None:  # messages may be lost where the counter begins anew
-        period = float(np.median(change[change > 0]))
         fallen = fallen + np.round((levels - fallen) / period) * period
     found = _range(fallen, stamp, _noise(series, places, expected - change, even))
     if found is None:
         return Continuous(series)
     wrap, matching = found
+    if even:  # to the sensor's jitter, while levels blur where a queue is as long as the range
+        by_rhythm = period - change[falls]
+        matching |= np.abs(by_rhythm - wrap.size_ns) < _WITHIN * min(wrap.size_ns, period)
     turns = np.zeros(stamp.size)
     turns[falls[matching] + 1] = 1.0
-    if series.receive is not None:  # a gap may be longer than the range
-        more = np.round((expected - change) / wrap.size_ns)
-        in_gap = (more == 1) & (expected > wrap.size_ns) & (change > 0)
-        within = (turns[1:] > 0) | (more > 1) | in_gap
-        turns[1:] = np.where(within, np.maximum(more, turns[1:]), turns[1:])
+    if series.receive is not None:
+        late = (series.receive[places] - stamp).astype(np.float64)
+        long_ = (expected > wrap.size_ns) & (change > 0)
+        turns = _with_gaps(turns, expected - change, late, wrap.size_ns, long_)
     whole = series.stamp.copy()
     whole[places] = stamp + np.round(np.cumsum(turns) * wrap.size_ns).astype(np.int64)
     at = series.seconds[places][falls[matching] + 1]
     fault = _fault(wrap, int(matching.sum()), float(at[0]), float(at[-1]))
     return Continuous(replace(series, stamp=whole), (fault,))
+
+
+def _as_often(
+    series: Series, places: NDArray[np.intp], change: NDArray[np.int64]
+) -> bool:  # fmt: skip
+    """Whether messages come as often as their stamps rise: no turn lies between two of them."""
+    if series.receive is None or places.size < 2 * _AROUND:
+        return series.receive is None
+    receive = series.receive[places]
+    passed = float(np.median(receive[_AROUND:] - receive[:-_AROUND])) / _AROUND
+    return abs(passed / float(np.median(change[change > 0])) - 1.0) < _OFTEN
+
+
+def _with_gaps(turns: Array, excess: Array, late: Array, size_ns: float, long_: Mask) -> Array:
+    """Turns with those in gaps longer than the range: messages behind one are later for good, while
+    one that came late alone, and the queue behind it, are not.
+
+    excess: how much further than its stamp each message came after the one before; long_: gaps.
+    """
+    more = np.round(excess / size_ns)
+    more[(more == 1.0) & ~long_] = 0.0
+    turned = turns.copy()
+    late = late - np.cumsum(turns) * size_ns
+    for k in np.flatnonzero(more > turns[1:]) + 1:
+        before, after = late[max(0, k - _AROUND) : k], late[k : k + _AROUND]
+        whole = max(0.0, float(np.round((np.median(after) - np.median(before)) / size_ns)))
+        turned[k] += min(more[k - 1] - turns[k], whole)
+    return turned
 
 
 def _fault(wrap: Range, count: int, first_s: float, last_s: float) -> StampFault:
@@ -207,7 +238,8 @@ def _is_full(stamp: NDArray[np.int64], size: float) -> bool:
     low, high = np.percentile(stamp, [0.2, 99.8])
     ahead = np.diff(stamp)
     step = float(np.median(ahead[ahead > 0])) if bool(np.any(ahead > 0)) else 0.0
-    bins = min(_BINS, max(3, int(0.5 * size / max(step, 1.0))))  # each wider than an interval
+    wide = max(size / max(step, 1.0), 2.0)  # intervals
+    bins = min(_BINS, max(min(3, round(wide)), int(0.5 * wide)))  # each wider than one if it can
     everywhere = np.histogram(stamp, bins=bins, range=(float(low), float(high) + 1.0))[0].all()
     return bool(everywhere and 0.9 * (size - step) < float(high - low) <= 1.001 * size)
 

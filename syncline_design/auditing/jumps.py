@@ -55,6 +55,7 @@ _SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
 _BACK: Final = 0.3  # of a jump: what returns by more settles, and is no step
 _LEAST_SETS: Final = 6  # jumps that come in a beat
 _BEAT: Final = 0.1  # of the time between them
+_PARTS: Final = (1, 2, 3)  # of the least time between jumps
 _EQUAL: Final = 0.02
 _SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
 
@@ -267,13 +268,9 @@ def _faults(found: list[Jump], times: Array, pace: Cadence) -> tuple[StampFault,
     begins = times[[jump.place for jump in found]]
     sizes = np.asarray([jump.size_s for jump in found])
     even = sizes.size >= _LEAST_SETS and all(jump.end is None for jump in found)
-    if even:
-        apart = np.diff(begins)
-        turns = np.maximum(np.round(apart / np.percentile(apart, 25.0)), 1.0)
-        beat = float(apart.sum() / turns.sum())
-        off = float(np.percentile(np.abs(apart - turns * beat), 90.0))
-        even = off < _BEAT * beat and float(np.ptp(np.sign(sizes))) == 0.0
-    if not even:
+    beat = _beat_of(np.diff(begins)) if even else None
+    even = beat is not None and float(np.ptp(np.sign(sizes))) == 0.0
+    if beat is None or not even:
         return tuple(_fault(jump, times, pace) for jump in found)
     size, total = float(np.median(sizes)), float(sizes.sum())
     return (StampFault(
@@ -282,6 +279,17 @@ def _faults(found: list[Jump], times: Array, pace: Cadence) -> tuple[StampFault,
         f"stamps move by {_signed(size)} in the median every {to_digits(beat, 4)} s, "
         f"{sizes.size} times, {_signed(total)} in all: their clock is set again and again",
     ),)  # fmt: skip
+
+
+def _beat_of(apart: Array) -> float | None:
+    """The time of which all times between jumps are whole multiples [s], as of jumps that are too
+    small to be seen every time: the shorter ones of these times, or a part of the least."""
+    for part in (float(np.percentile(apart, 25.0)), *(float(apart.min()) / k for k in _PARTS)):
+        turns = np.maximum(np.round(apart / part), 1.0)
+        beat = float(apart.sum() / turns.sum())
+        if float(np.percentile(np.abs(apart - turns * beat), 90.0)) < _BEAT * beat:
+            return beat
+    return None
 
 
 def _signed(size_s: float) -> str:

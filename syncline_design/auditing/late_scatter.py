@@ -21,6 +21,8 @@ _LAG: Final = 64
 _WALKS: Final = 0.45  # of a block's spread: how far floors differ; of a random walk 1.2
 _ONE_SIDED: Final = 0.55  # floors against ceilings; of a scatter to both sides 1
 _SHARP: Final = 0.3  # floors that are the edge of something, such as of a wait for the next turn
+_WALKED: Final = 0.5  # of how far messages reach above their floor
+_MOST_WALKED: Final = 0.02  # of all dozens
 _LAGS: Final = tuple(range(1, 13))
 _PATTERN: Final = 0.4  # of the scatter of intervals: what repeats itself is no chance
 
@@ -30,7 +32,8 @@ class Waits:
     """Delays [s] of messages, each against the middle of its dozen.
 
     reach_s: the longest but few, above the floor.  late: they reach further above it than they come
-    near to it.  edged: whether the floor is sharp, which a scatter to both sides has not.
+    near to it.  edged: whether the floor is sharp, which a scatter to both sides has not, and
+    stays where it is, which that of a sensor at another rate does not.
     """
 
     about_s: Array
@@ -55,7 +58,15 @@ def waits_of(when: Array) -> Waits | None:
         return None
     about = (blocks - middle[:, None]).ravel()
     reach = float(np.percentile(blocks - low[:, None], 99.5))
-    return Waits(about, reach, floors < _ONE_SIDED * ceilings, floors < _SHARP * width)
+    edged = floors < _SHARP * width and not _other_rates(low, high - low)
+    return Waits(about, reach, floors < _ONE_SIDED * ceilings, edged)
+
+
+def _other_rates(low: Array, reach: Array) -> bool:
+    """Whether floors walk away by as much as messages scatter above them: in more dozens than
+    losses explain the sensor measured more or less often, and nothing waited."""
+    walked = np.abs(np.diff(low)) > _WALKED * np.minimum(reach[:-1], reach[1:])
+    return float(np.mean(walked)) > _MOST_WALKED
 
 
 def _repeats(passed: Array) -> bool:

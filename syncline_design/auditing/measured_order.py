@@ -39,6 +39,7 @@ _NEXT: Final = 9  # intervals, most of which are usual
 _MOST_FREE: Final = 20_000
 _LONG_GAP: Final = 50.0  # intervals
 _REPEATED: Final = 2.5  # intervals: a message that repeats an older stamp than its last but one
+_COVERED: Final = 0.5  # of the time that passed
 _DEEPEST_NS: Final = 2 * 10**9  # a stamp further back was not overtaken
 
 
@@ -70,6 +71,8 @@ def sequence_of(series: Series) -> Sequence | None:
         return None
     level = set_by(stamp, receive)
     key = stamp + np.round(level).astype(np.int64)
+    if _folded(key, receive):
+        return None
     jumps = _levels(late, np.abs(_advance(receive - stamp)) > least, least)  # of either clock
     usual = jumps + _course(late - jumps)
     away = late - usual
@@ -91,6 +94,13 @@ def sequence_of(series: Series) -> Sequence | None:
     wrong[places[:_SIDE]] = wrong[places[-_SIDE:]] = False  # too few to tell a jump by
     overtaken: Array = np.where(right, behind, 0).astype(np.float64)
     return Sequence(order, wrong, overtaken, away, period)
+
+
+def _folded(key: NDArray[np.int64], receive: NDArray[np.int64]) -> bool:
+    """Whether stamps in order cover much less time than passed, as those of a counter that begins
+    anew before a jump can be told: to sort them would fold all its turns into one."""
+    covered, passed = (np.subtract(*np.percentile(x, [95.0, 5.0])) for x in (key, receive))
+    return bool(covered < _COVERED * passed)
 
 
 def _placed(

@@ -22,6 +22,7 @@ from syncline_design.auditing.levels import believed, polished, shapes_of
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds
+from syncline_design.auditing.settling import settled
 from syncline_design.auditing.witness import Side
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -105,11 +106,12 @@ def _slow_shifts(
     own = _own(found, sides, sharp, time_s, blocks)
     told = witness.mirrored(count, blocks) if not own else None
     if told is not None:
-        own = tuple(s for s in shapes_of(told, least_s=least_s) if s.kind != "drift")
+        again = shapes_of(told, least_s=least_s, settling_s=settling_s)
+        own = tuple(s for s in again if s.kind != "drift")
     if len(own) < len(found):  # without what is transport, sizes are others
         own = polished(own, [True] * len(own), blocks)
         own = own if told is not None else tuple(s for s in own if believed(s, blocks, least_s))
-    own = witness.simplest(count, own, blocks)
+    own = settled(witness.simplest(count, own, blocks), time_s, late, blocks)
     whole = series.stamp.copy()
     whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
     faults = tuple(all_named(own, time_s))
