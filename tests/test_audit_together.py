@@ -224,3 +224,22 @@ def test_a_clock_that_is_set_is_told_from_two_streams_one_of_which_slips(
         seconds = float(found(row)["recorder_clock"].parameters["seconds"])
         assert abs(seconds) == pytest.approx(abs(set_by), abs=0.01)
         assert row.residual_s.bound == pytest.approx(delay_s, rel=0.1)
+
+
+@pytest.mark.parametrize(("seed", "name"), [
+    (12, "overtaking_even_lost_messages_counter_wrap_11"),
+    (11, "noted_by_threads_even_lost_messages_counter_wrap_11"),
+])  # fmt: skip
+def test_a_clock_that_is_set_is_told_though_a_counter_begins_anew_near_by(
+    tmp_path: Path, seed: int, name: str
+) -> None:
+    recordings = audit_together.corpus(seed, 2, 2)
+    recording = next(one for one in recordings if one.name == name)
+    paths = [written(tmp_path / f"{one.name}.csv", one.stamp_ns, one.receive_ns)
+             for one in recording.streams]  # fmt: skip
+    rows = {row.name: row for row in audit(paths).streams}
+    for one in recording.streams:
+        assert "recorder_clock" in one.planted
+        assert set(found(rows[one.name])) == set(one.planted)
+        assert one.bound_s is not None
+        assert rows[one.name].residual_s.bound == pytest.approx(one.bound_s, rel=0.2)

@@ -18,7 +18,7 @@ from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, in_words, seconds, spread
 from syncline_design.auditing.stream import Examined, examined
-from syncline_design.logs.readers.stream import UNSET
+from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
@@ -165,13 +165,13 @@ def _seen_beside(one: Examined, shape: Shape) -> bool | None:
 
     Medians of some messages on each side, so that neither their order nor one of them matters.
     """
-    raw, side = one.raw, _NEXT_TO
-    places = raw.places()
-    if raw.receive is None or places.size < 8 * side:
+    whole, side = one.whole, _NEXT_TO
+    places = whole.places()
+    if whole.receive is None or places.size < 8 * side:
         return None
     stamp, receive = (
-        seconds(raw.stamp[places] - raw.start),
-        seconds(raw.receive[places] - raw.start),
+        seconds(whole.stamp[places] - whole.start),
+        seconds(whole.receive[places] - whole.start),
     )
     late = receive - stamp
     near = np.flatnonzero(np.abs(receive - shape.begin_s) <= abs(shape.size_s) + _NEAR_S)
@@ -219,7 +219,7 @@ def _again(one: Examined, found: _Course, start: int | None) -> Examined:
     known = (receive != UNSET) & (stamps.primary_ns != UNSET)
     moved: Array = np.zeros(receive.size)
     times = (receive[known] - one.raw.start) / NS
-    late = (receive[known] - stamps.primary_ns[known]) / NS
+    late = (receive[known] - _continuous(one)[known]) / NS
     total: Array = np.zeros(times.size)
     for shape in found.shapes:
         total = total + _moved(shape, times, late)
@@ -237,6 +237,19 @@ def _again(one: Examined, found: _Course, start: int | None) -> Examined:
     faults = (*kept, *(_fault(shape, found.among, end) for shape in found.shapes))
     return replace(new, stream=one.stream, raw=one.raw, trace=one.trace, offset_s=one.offset_s,
                    residual=residual, faults=faults)  # fmt: skip
+
+
+def _continuous(one: Examined) -> Nanoseconds:
+    """Stamps of one unit whose counters never begin anew, in the order of the file."""
+    stamps = one.stream.stamps
+    assert stamps is not None
+    assert stamps.secondary_ns is not None
+    assert one.raw.receive is not None
+    of_file = np.lexsort((stamps.primary_ns, stamps.secondary_ns))
+    of_raw = np.lexsort((one.raw.stamp, one.raw.receive))
+    found = np.empty_like(stamps.primary_ns)
+    found[of_file] = one.whole.stamp[of_raw]
+    return found
 
 
 def _moved(shape: Shape, times: Array, late: Array) -> Array:

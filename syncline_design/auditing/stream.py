@@ -61,10 +61,15 @@ _LARGE_STEP_NS: Final = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Examined:
-    """A stream and all that its own stamps say; shifts: to be held against other streams."""
+    """A stream and all that its own stamps say; shifts: to be held against other streams.
+
+    raw: as recorded, in the order of measurement.  whole: the same with stamps of one unit, and
+    counters made continuous.
+    """
 
     stream: Stream
     raw: Series
+    whole: Series
     series: Series  # every named fault taken out
     faults: tuple[StampFault, ...]
     shifts: tuple[Shift, ...]
@@ -97,6 +102,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     else:
         found.append(disorder.fault)
     series = _continuous(series, disorder, found)
+    continuous = replace(series, receive=raw.receive)
     grain = _grain(series, step_ns, found)
     part = None if grain else arrival.arrived_in_part(series, cadence(series))
     arrived = None if grain or part else arrival.stamped_on_arrival(series, cadence(series))
@@ -132,9 +138,9 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     found = _with_jumps(found, [*slips.faults, *moved.faults], pace.period_s)
     _last(series, pace, stream, known, grain, found)
     found = [f for f in found if not _at_edges(f, disorder)]
-    whole = _summed(stream, raw, series, pace, found, (slips, moved), known)
+    one = _summed(stream, (raw, continuous, series), pace, found, (slips, moved), known)
     hidden = None if _late_or_coarse(found) else arrival.hidden_in(series, pace)
-    return replace(whole, overtaken=disorder, copied=_copied(whole), hidden=hidden)
+    return replace(one, overtaken=disorder, copied=_copied(one), hidden=hidden)
 
 
 def _late_or_coarse(found: Sequence[StampFault]) -> bool:
@@ -300,10 +306,12 @@ def _constant(
 
 
 def _summed(
-    stream: Stream, raw: Series, series: Series, pace: Cadence, found: list[StampFault],
+    stream: Stream, states: tuple[Series, Series, Series], pace: Cadence, found: list[StampFault],
     moved: tuple[Shifts, Shifts], known: float | None,
 ) -> Examined:  # fmt: skip
-    """Everything that was found, with what is left of the delays."""
+    """Everything that was found, with what is left of the delays; states: the series as recorded,
+    made continuous, and without its faults."""
+    raw, whole, series = states
     told = series.receive is not None and series.good.sum() > 1
     constant = None
     if told and known is not None:
@@ -311,9 +319,9 @@ def _summed(
         constant = float(np.min(late)) + known
     faults = tuple(found)
     return Examined(
-        stream, raw, series, faults, (*moved[0].shifts, *moved[1].shifts), pace, _offset(raw),
-        residual_of(raw, series, faults), _smallest(moved[1].blocks), _trace(raw) if told else (),
-        constant, moved[1].blocks, moved[1].seen, moved[1].breathing_s,
+        stream, raw, whole, series, faults, (*moved[0].shifts, *moved[1].shifts), pace,
+        _offset(raw), residual_of(raw, series, faults), _smallest(moved[1].blocks),
+        _trace(raw) if told else (), constant, moved[1].blocks, moved[1].seen, moved[1].breathing_s,
     )  # fmt: skip
 
 
