@@ -19,6 +19,7 @@ from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.epochs import WEEK_NS, gps_to_utc, week_start_ns
 from syncline_design.logs.reading import read_log
 from syncline_design.logs.stream_times import ASSUMED_GPS
+from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
 from tests import flat_flight_logs as made
 from tests.flight_logs import ORIGIN, TO_ENU, TO_FLU, Flight, flight, geodetic
@@ -150,8 +151,8 @@ def test_the_delay_is_found_from_a_pair_of_formats(tmp_path: Path, name: str) ->
 
 def rows_of(files: list[Path], choice: LogChoice) -> tuple[float, tuple[str, ...]]:
     """The delay by least squares on the rows, and what was said of them."""
-    log = read_log(row_sources(files, choice, ["uav"], poses=False), ["uav"], needs_ranging=False,
-                   origin=choice.origin)  # fmt: skip
+    log = read_log(row_sources(files, choice, ["uav"], poses=False), ["uav"], choice.columns,
+                   needs_ranging=False, origin=choice.origin)  # fmt: skip
     antenna, velocity = log.stages[0].antenna_m, log.stages[0].velocity_mps
     assert antenna is not None
     return -np.sum((antenna - log.truth_m) * velocity) / np.sum(velocity**2), log.notes
@@ -219,3 +220,41 @@ def test_a_level_trajectory_contradicts_no_rates(tmp_path: Path, rates: str) -> 
     assert abs(value - LATE_S) < 4.0 * sigma
     said = any("rates are zero throughout" in note for note in result.log.notes)
     assert said == (rates == "not filled in")
+
+
+def truth_table(path: Path) -> Path:
+    """Places and attitudes of the truth under names of its own."""
+    euler = np.degrees(TRUTH.turn.as_euler("ZYX"))[:, ::-1]
+    rows = ["when,n,e,d,phi,theta,psi"]
+    for t, place, turn in zip(TRUTH.stamp_ns.tolist(), TRUTH.place, euler, strict=True):
+        figures = ",".join(f"{v:.9f}" for v in (*place, *turn))
+        rows.append(f"{t // 10**9}.{t % 10**9:09d},{figures}")
+    path.write_text("\n".join(rows) + "\n", "utf-8")
+    return path
+
+
+MAPPED = {
+    "time_s": "when", "reference_north_m": "n", "reference_east_m": "e", "reference_down_m": "d",
+    "roll_deg": "phi", "pitch_deg": "theta", "yaw_deg": "psi",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["truth", "truth.csv"])
+def test_a_mapped_table_may_be_named_beside_a_recording(tmp_path: Path, name: str) -> None:
+    files = [made.write_pos(tmp_path / "gnss.pos", FIXES), truth_table(tmp_path / "truth.csv")]
+    lat, lon, height = ORIGIN
+    origin = [f"{lat} deg", f"{lon} deg", f"{height} m"]
+    said = {"columns": MAPPED, "origin": origin, "timeline": "utc"}
+    plain = rows_of(files, LogChoice.model_validate(said))
+    choice = LogChoice.model_validate(said | {"streams": {"reference": name, "position": "gnss"}})
+    assert rows_of(files, choice)[0] == plain[0]
+    assert plain[0] == pytest.approx(LATE_S, abs=1e-3)
+    parts = inspect_logs(files, choice, poses=False, stages=["uav"]).proposal.parts
+    assert {"reference", "position", "attitude"} <= {part.role for part in parts}
+
+
+def test_a_table_named_for_a_part_that_it_does_not_play_is_refused(tmp_path: Path) -> None:
+    files = [made.write_pos(tmp_path / "gnss.pos", FIXES), truth_table(tmp_path / "truth.csv")]
+    choice = LogChoice.model_validate({"columns": MAPPED, "streams": {"ranging": "truth"}})
+    with pytest.raises(BadInput, match="no columns of a ranging"):
+        row_sources(files, choice, ["uav"], poses=False)

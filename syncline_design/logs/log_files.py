@@ -25,7 +25,7 @@ from syncline_design.logs.readers import open_recording, reader_of, registry
 from syncline_design.logs.readers.reader import head_of
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.roles import Offer, Role, offers_of
+from syncline_design.logs.roles import ROLES, Offer, Role, offers_of
 from syncline_design.logs.row_source import RowSource
 from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.sources import demand_plain_file, opened
@@ -34,7 +34,7 @@ from syncline_design.logs.stream_sources import sources_of
 from syncline_design.logs.surveys import Survey, first_survey
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
-from syncline_design.spec.log_block import LogChoice
+from syncline_design.spec.log_block import LogChoice, StreamChoice
 
 TABLES = (".parquet", ".pq")
 ONE_STAGE = ("stage",)  # where no spec names stages: columns then begin with none of them
@@ -83,9 +83,11 @@ def row_sources(
         return list(files.tables)
     run = one_run([open_recording(path) for path in files.recordings])
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
+    offers = some_offers(run)
     sources = sources_of(
-        some_offers(run), choice, prefix, poses, files.held, files.survey, _arms(arms or {}, stages)
-    )
+        offers, without_tables(choice, files, offers), prefix, poses, files.held, files.survey,
+        _arms(arms or {}, stages),
+    )  # fmt: skip
     static = [pose for one in run for stream in one.streams() for pose in stream.static]
     for source in sources[:1]:
         source.notes += arm_notes(arms_beside(static, arms or {}))
@@ -99,6 +101,27 @@ def some_offers(recordings: Sequence[Recording]) -> list[Offer]:
         first = recordings[0]
         raise refuse(first.path, "no message in the log", found=f"a {first.format} without any")
     return offers
+
+
+def without_tables(choice: LogChoice, files: SortedFiles, offers: Sequence[Offer]) -> LogChoice:
+    """What a spec says of recordings: of the streams that it names, those that are no table of the
+    call, whose columns say which part it plays; refuses a table that plays another."""
+    streams = {one.name for one in offers}
+    left = choice.streams.model_dump()
+    for role in ROLES:
+        name = left[role]
+        for table, held in zip(files.tables, files.held_by, strict=True):
+            if name is None or name in streams or name not in (table.path.name, table.path.stem):
+                continue
+            if role not in held:
+                raise refuse(
+                    table.path, f"{name} has no columns of a {role}",
+                    field=f"log.streams.{role}",
+                    expected="columns of that part by the package's names, or by `log: {columns}`",
+                    found=", ".join(table.header[:12]),
+                )  # fmt: skip
+            left[role] = None
+    return choice.model_copy(update={"streams": StreamChoice(**left)})
 
 
 def roles_of_table(

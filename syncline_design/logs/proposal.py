@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Literal
 
 from syncline_design.logs.log import LogKind
-from syncline_design.logs.log_files import SortedFiles, some_offers, sorted_files
+from syncline_design.logs.log_files import SortedFiles, some_offers, sorted_files, without_tables
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.reading import read_log
 from syncline_design.logs.roles import ROLES, Offer, Part, Role, Sureness, parts_of
@@ -78,7 +78,8 @@ def proposed(
         if not files.recordings:
             return _of_tables(files, choice, poses, stages)
         run = one_run([one for one in recordings if one.path in files.recordings])
-        return _of_streams(some_offers(run), files, choice, poses)
+        offers = some_offers(run)
+        return _of_streams(offers, files, without_tables(choice, files, offers), poses)
     except BadInput as error:
         return _nothing(str(error))
 
