@@ -184,9 +184,39 @@ def test_the_residual_is_written_into_a_spec_on_request_and_marked(
     bound = audited(folder / "gnss.csv")["streams"][0]["residual_s"]["bound"]
     assert float(role["timestamping"]["error"]["low"].split()[0]) == pytest.approx(-bound, rel=1e-5)
     assert role["timestamping"]["error"]["high"] == "0 s"
-    assert "upper bound from audit of gnss" in role["note"]
+    said = "upper bound from audit of gnss once whole_second_slip is mended, transport included"
+    assert said in role["note"]
     assert CliRunner().invoke(app, ["check", str(out)]).exit_code == 0
     assert run(folder / "gnss.csv", "--write-spec", out).exit_code == 2
+
+
+@pytest.mark.parametrize(("names", "taken"), [
+    (("attitude", "imu"), "attitude"), (("imu", "ins"), None), (("imu",), "imu"),
+])  # fmt: skip
+def test_a_role_is_given_by_its_own_word_before_others_and_never_in_silence(
+    tmp_path: Path, names: tuple[str, ...], taken: str | None
+) -> None:
+    spec = tmp_path / "a.yaml"
+    spec.write_text(
+        "syncline: 1\nname: a\nrequirements: [{id: A, kind: accuracy, limit: 10 m}]\n"
+        "stages:\n  - name: car\n"
+        "    platform: {v_max: 20 m/s, omega_max: 40 deg/s, distance: 1 m, baseline: 1 m}\n"
+        "    position: {sensor: ublox_f9p_rtk, primitive: arrival, timestamping: arrival}\n"
+        "    attitude:\n      sensor: {modality: attitude, type: ins, primitives: [arrival],\n"
+        "        sigma_attitude: 0.1 deg}\n"
+        "      primitive: arrival\n"
+        "      timestamping: {error: {distribution: uniform, low: -1 ms, high: 0 ms}}\n",
+        "utf-8",
+    )  # fmt: skip
+    rows = [f"{1_750_000_000 + k / 10:.3f},{1_750_000_000 + k / 10 + 0.004:.3f}" for k in range(99)]
+    files = [tmp_path / f"{name}.csv" for name in names]
+    for path in files:
+        path.write_text("\n".join(["stamp_s,receive_s", *rows, ""]), "utf-8")
+    found = audited(*files, "--spec", spec)
+    roles = {row["name"]: row.get("role") for row in found["streams"]}
+    assert [name for name, role in roles.items() if role] == ([taken] if taken else [])
+    said = [note for note in found["notes"] if "each may be car.attitude" in note]
+    assert len(said) == (0 if taken else 1)
 
 
 def test_a_table_of_no_numbers_is_not_sound(tmp_path: Path) -> None:

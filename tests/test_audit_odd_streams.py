@@ -102,6 +102,7 @@ def test_a_lock_that_settles_within_few_messages_of_tight_delays(
     assert row.faults[0].parameters["seconds"] == pytest.approx(size, rel=0.1)
     assert row.faults[0].parameters["settling_s"] == pytest.approx(settling, rel=0.1)
     assert row.residual_s.bound < 0.02 * abs(size)
+    assert not any("to and fro" in words for words in row.cannot_show)
 
 
 def test_a_clock_that_is_set_in_a_beat_of_which_some_show(tmp_path: Path) -> None:

@@ -111,7 +111,9 @@ def _slow_shifts(
     if len(own) < len(found):  # without what is transport, sizes are others
         own = polished(own, [True] * len(own), blocks)
         own = own if told is not None else tuple(s for s in own if believed(s, blocks, least_s))
-    own = settled(witness.simplest(count, own, blocks), time_s, late, blocks)
+    own = witness.simplest(count, own, blocks)
+    left = tuple(s for s in found if s not in own and s.kind not in ("step", "episode"))
+    own = settled(own, time_s, late, blocks)
     whole = series.stamp.copy()
     whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
     faults = tuple(all_named(own, time_s))
@@ -119,7 +121,6 @@ def _slow_shifts(
         Shift(s.begin_s, None if s.kind == "step" else s.end_s, s.size_s, side, blocks.length_s)
         for s, side, seen in zip(found, sides, sharp, strict=True) if seen or side == "stamp"
     )  # fmt: skip
-    left = tuple(s for s in found if s not in own and s.kind not in ("step", "episode"))
     breathing = float(np.ptp(course(left, blocks.time_s))) if left else 0.0
     return Shifts(replace(series, stamp=whole), faults, shifts, blocks, breathing, seen)
 

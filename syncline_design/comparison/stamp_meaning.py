@@ -32,6 +32,9 @@ _WORDS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 
 
+_IS = ("is", "are")
+
+
 @dataclass(frozen=True, slots=True)
 class Played:
     """A role of the spec's design and the stream that plays it."""
@@ -51,8 +54,8 @@ def held_against(audit: Audit, case: Case, seed: int) -> Audit:
     verdict = check_loaded(as_measured(case, seed), CheckSettings(seed=seed))
     played = _played(audit, case, verdict)
     rows = tuple(_held(row, played.get(k)) for k, row in enumerate(audit.streams))
-    notes = list(audit.notes)
-    if not played:
+    notes = [*audit.notes, *_undecided(audit, case, verdict, played)]
+    if not played and len(notes) == len(audit.notes):
         notes.append("no stream plays a role of the spec by its name or quantity: say which in "
                      "the spec, `log: {streams: {position: NAME, attitude: NAME}}`")  # fmt: skip
     return replace(audit, streams=rows, notes=tuple(notes))
@@ -76,6 +79,23 @@ def _played(audit: Audit, case: Case, verdict: Verdict) -> dict[int, Played]:
     return taken
 
 
+def _undecided(
+    audit: Audit, case: Case, verdict: Verdict, played: Mapping[int, Played]
+) -> Iterator[str]:  # fmt: skip
+    """Roles that several streams could play, none of them more than the others."""
+    said = _said(case)
+    free = [row.name for k, row in enumerate(audit.streams) if k not in played]
+    for stage, role, _ in _roles(verdict):
+        named = [name for name in free if _has_word(name, _WORDS[role])]
+        if (
+            role not in said
+            and f"{stage}.{role}" not in {p.label for p in played.values()}
+            and named
+        ):
+            yield (f"{', '.join(named)}: each may be {stage}.{role}, and none was taken as it: say "
+                   f"which in the spec, `log: {{streams: {{{role}: NAME}}}}`")  # fmt: skip
+
+
 def _said(case: Case) -> dict[str, str]:
     """`log: {streams: {position: NAME}}`."""
     block = getattr(case.spec.log, "streams", None)
@@ -92,10 +112,12 @@ def _stream_of(
         named = [k for k in free if audit.streams[k].name == said[role]]
         return (named[0] if named else None), "as the spec's `log: streams` says"
     exact = [k for k in free if _has_word(audit.streams[k].name, (row.sensor, f"{stage}_{role}"))]
+    own = [k for k in free if _has_word(audit.streams[k].name, (role,))]
     by_word = [k for k in free if _has_word(audit.streams[k].name, _WORDS[role])]
     kinds = [k for k in free if role in audit.streams[k].quantity]
     for found, why in (
         (exact, "by its name"),
+        (own, "by its name"),
         (by_word, "by its name"),
         (kinds, "by its quantity"),
     ):
@@ -141,7 +163,13 @@ def spec_with_residuals(audit: Audit, case: Case) -> str | None:
             continue
         stage, _, role = row.role.rpartition(".")
         index = next(k for k, one in enumerate(case.spec.stages) if one.name == stage)
-        errors.append((index, cast(RoleName, role), bound, row.name))
+        errors.append((index, cast(RoleName, role), bound, _mended(row)))
     if not errors:
         return None
     return with_timestamping_text(case, errors)
+
+
+def _mended(row: StreamAudit) -> str:
+    """The stream, and what has to be mended before its residual is all that it has."""
+    names = dict.fromkeys(f.fault for f in row.faults if f.counts and f.fault not in _ON_ARRIVAL)
+    return f"{row.name} once {', '.join(names)} {_IS[len(names) > 1]} mended" if names else row.name
