@@ -94,6 +94,21 @@ def test_a_tiny_session_hardly_widens_the_bound_and_a_large_one_does() -> None:
     assert bounds[2] >= 1e-3
 
 
+@pytest.mark.parametrize(("count", "share"), [(7, 0.348), (20, 0.139), (59, 0.0495)])
+def test_what_no_session_held_may_be_true_of_that_many(
+    count: int, share: float, tmp_path: Path
+) -> None:
+    """A share p of bad starts leaves n sessions without one in (1 - p)^n of campaigns: in 5 %."""
+    rng = np.random.default_rng(5)
+    lucky = np.mean(np.all(rng.random((20_000, count)) >= share, axis=1))
+    assert lucky == pytest.approx(0.05, abs=4.0 * math.sqrt(0.05 * 0.95 / 20_000))
+    logs = sessions_csv(tmp_path, [1e-5] * count, count=30)
+    claim = study_logs(logs, TimingSettings()).timing.claim
+    assert claim.unseen_share == pytest.approx(share, abs=6e-4)
+    said = " ".join(run("timing", *logs).stdout.split())
+    assert (f"up to {100.0 * share:.1f} % of all starts (95 % confidence)" in said) == (count < 59)
+
+
 def test_the_largest_session_carries_it_from_59_on() -> None:
     source = np.random.default_rng(8)
     many = np.exp(source.normal(-11.0, 0.4, 59))

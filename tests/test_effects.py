@@ -380,3 +380,14 @@ def test_a_new_effect_is_a_new_file(twin: str, tmp_path: Path) -> None:
     for figure in means.figures:
         assert (figure.after_m or 0.0) > 2.0 * (figure.before_m or 0.0), figure
     assert f"effect: {twin}" in with_effects_text(case, entries)
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [("30.05 ± 0.13 ms", "30.05 ± 0.13 ms older"), ("-30.05 ± 0.13 ms", "30.05 ± 0.13 ms younger")],
+)
+def test_data_are_older_or_younger_than_their_stamps_and_never_less_than_nothing(
+    value: str, said: str
+) -> None:
+    words = registry()["latency"].in_words("position", {"latency_s": value})
+    assert words == f"position data are {said} than their stamps"

@@ -56,7 +56,9 @@ class TimingClaim(Record):
 
     made: False: these logs cannot carry it; needs_sessions: how many more would.  method: how the
     statistical bound was made.  shape_free_from: sessions from which it holds whatever the
-    distribution of sessions.  session_s: median length of a session, to which the claim is bound.
+    distribution of sessions.  unseen_share: what none of these sessions held may be true of up to
+    this share of starts, with the same confidence.  session_s: median length of a session, to
+    which the claim is bound.
     """
 
     coverage: float
@@ -71,6 +73,7 @@ class TimingClaim(Record):
     session_s: float | None
     method: str | None
     why_not: str | None = optional()
+    unseen_share: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,6 +36,7 @@ from syncline_design.clocks.tolerance import (
     LEAST_SESSIONS,
     sessions_of_order_statistic,
     tolerance_bound,
+    unseen_share,
 )
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -182,6 +183,7 @@ def _claim(
         shape_free_from=sessions_of_order_statistic(settings.session_share, settings.confidence),
         session_s=float(np.median(durations)) if durations else None,
         method=figures.method, why_not=why,
+        unseen_share=unseen_share(len(counted), settings.confidence) if counted else None,
     )  # fmt: skip
 
 

@@ -23,6 +23,15 @@ def sessions_of_order_statistic(share: float, confidence: float) -> int:
     return math.ceil(math.log1p(-confidence) / math.log(share) - 1e-9)
 
 
+def unseen_share(count: int, confidence: float) -> float:
+    """What may be true of so many of all starts without having come in any of these sessions.
+
+    (1 - p)^n = 1 - confidence: the upper limit of a proportion seen 0 times in n (Clopper and
+    Pearson 1934), whatever the distribution.
+    """
+    return -math.expm1(math.log1p(-confidence) / count)
+
+
 @cache
 def normal_factor(count: int, share: float, confidence: float) -> float:
     """k of mean + k s, a one-sided tolerance bound of normal values [1].

@@ -79,7 +79,7 @@ def finding(
 ) -> Finding:
     """A missing effect in words; rivals: aliases, lookalikes, excluded."""
     shown = {name: one.text for name, one in parameters.items()}
-    text = effect.sentence.format(sensor=WORDS[sensor], **shown)
+    text = effect.in_words(WORDS[sensor], shown)
     return Finding(
         effect.name,
         sensor,

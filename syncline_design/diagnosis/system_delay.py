@@ -56,13 +56,13 @@ def _joined(place: Finding, turn: Finding, a: Estimate, b: Estimate) -> Finding:
     if len(ends) == 2:  # no narrower than the better of the two about the joined value
         half = min(0.5 * (high - low) for low, high in ends)
         interval = (value - half, value + half)
-    text = format_estimate(value, spread, "s")
+    name, text = next(iter(place.parameters)), format_estimate(value, spread, "s")
     estimate = replace(a, value=value, standard_uncertainty=spread, text=text, interval95=interval)
     sizes = [one.size_m for one in (place, turn) if one.size_m is not None]
     return replace(
         place,
-        parameters={next(iter(place.parameters)): estimate},
-        sentence=f"position and attitude data are {text} older than their stamps",
+        parameters={name: estimate},
+        sentence=plain_delay().in_words("position and attitude", {name: text}),
         evidence=f"{place.evidence}; of the attitude: {turn.evidence}",
         gain_nat=place.gain_nat + turn.gain_nat,
         material=place.material or turn.material,

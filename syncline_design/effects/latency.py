@@ -50,6 +50,7 @@ EFFECT = Effect(
     kind="deterministic",
     parameters=(Parameter("latency_s", 1e-4, 2.0, "s"),),
     sentence="{sensor} data are {latency_s} older than their stamps",
+    reverse="{sensor} data are {latency_s} younger than their stamps",
     confused_with="a forward lever arm at constant speed (position); hard iron on reciprocal "
     "lines (attitude); position and attitude latency of equal size (ranging)",
     separated_by="vary the speed, stop, reverse; roll, pitch and turns both ways",

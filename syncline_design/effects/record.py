@@ -319,6 +319,7 @@ class Effect:
     asked_jointly: it is left free where a built system's log is asked for what undoes another; of
     those that break one assumption, one a sensor.
     sentence: for people, a format string over {sensor} and the parameters.
+    reverse: the sentence of a first parameter below zero, which then stands there by its size.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
     commissioned: of which sensors a first drive is asked for it, where nothing else is said.
     implied: no spec lists it; it follows from how often and by what a system measures.
@@ -356,6 +357,7 @@ class Effect:
     brief: tuple[str, ...] = ()
     commissioned: tuple[ActsOn, ...] = ()
     implied: bool = False
+    reverse: str = ""
 
     @property
     def wanders(self) -> bool:
@@ -377,6 +379,13 @@ class Effect:
             elif wrong := one.misfit(values[one.name], sensor):
                 wanted = one.choices_of(sensor) or (one.domain,)
                 yield Misfit(("parameters", one.name), wrong, str(values[one.name]), wanted)
+
+    def in_words(self, sensor: str, shown: Mapping[str, str]) -> str:
+        """The effect in one sentence; shown: its parameters as text, with units."""
+        first = self.parameters[0].name
+        if self.reverse and shown[first].startswith("-"):
+            return self.reverse.format(sensor=sensor, **{**shown, first: shown[first][1:]})
+        return self.sentence.format(sensor=sensor, **shown)
 
     def slopes(self) -> tuple[Parameter, ...]:
         """The parameters that `sensitivity` has a column for."""

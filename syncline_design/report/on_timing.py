@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from syncline_design.clocks.result import Timing
+from syncline_design.clocks.result import Timing, TimingClaim
 from syncline_design.comparison.clock_meaning import TimingAndSpec, TimingMeaning
 from syncline_design.model.figure_text import format_duration
 from syncline_design.report import numbers
@@ -153,14 +153,22 @@ def _claim(result: Timing) -> list[Node]:
         facts.append(("Conditions", given(result.conditions)))
     nodes: list[Node] = [Facts(tuple(facts), "record")]
     if claim.made and claim.method == "log-normal":
-        nodes.append(Text(
-            f"Rare bad starts are covered by nothing below {claim.shape_free_from} sessions.",
-            quiet=True,
-        ))  # fmt: skip
+        nodes.append(Text(_unseen(claim), quiet=True))
     if not claim.made:
         said = f"No claim: {claim.why_not}." if claim.why_not else "No claim."
         nodes.append(Text(said, mark="!", tone="warn"))
     return nodes
+
+
+def _unseen(claim: TimingClaim) -> str:
+    """What the tolerance bound takes for granted of the starts that these sessions are not."""
+    return (
+        f"It takes other starts to be of the kind of these {claim.sessions}. Bad ones of which "
+        "none is among them are not covered: they may be up to "
+        f"{numbers.percent(claim.unseen_share)} of all starts "
+        f"({numbers.percent(claim.confidence)} confidence), and less than "
+        f"{numbers.percent(1.0 - claim.session_share)} only from {claim.shape_free_from} on."
+    )
 
 
 def _spec(result: TimingAndSpec) -> list[Node]:

@@ -67,4 +67,4 @@ def describe(entry: EffectEntry) -> str:
         name: value if isinstance(value, str) else format_estimate(value, None, units.get(name, ""))
         for name, value in entry.parameters
     }
-    return effect.sentence.format(sensor=entry.sensor, **shown)
+    return effect.in_words(entry.sensor, shown)
