@@ -662,6 +662,34 @@ def test_clock_logs_against_the_clock_of_the_spec(
     assert {one["read_as"] for one in result["evidence"]} == {"clock"}
 
 
+@pytest.mark.parametrize(
+    ("sigma_s", "sessions", "timeline", "status", "words"),
+    [
+        (1e-4, 20, "utc", "holds", "does not turn the verdict"),
+        (1e-4, 1, "utc", "not_shown", "no claim"),
+        (1e-2, 20, "utc", "broken", "fails SYNC"),
+        (1e-2, 1, "utc", "broken", "fails SYNC"),
+        (1e-2, 20, "host", "holds", "cancels"),
+    ],
+)
+def test_the_log_of_a_clock_that_the_spec_does_not_name_counts(
+    clocked: Path, sigma_s: float, sessions: int, timeline: str, status: str, words: str
+) -> None:
+    """Without `clock` its offset is taken as 0: 20 ms are beyond the position's 8.7 ms."""
+    text = CLOCKED.replace("    clock: {candidates: [own]}\n", "")
+    clocked.write_text(text.replace("timeline: utc", f"timeline: {timeline}"), "utf-8")
+    alone = run("accept", clocked, "--only", "clock", "-o", "json:-")
+    assert json.loads(alone.stdout)["assumptions"] == []
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [sigma_s] * sessions, count=800, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert (row["assumption"], row["assumed"], row["status"]) == ("clock", 0.0, status), row
+    assert words in row["evidence"]
+    assert done.exit_code == {"holds": 0, "broken": 1, "not_shown": 3}[status]
+
+
 def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
     folder = clocked.parent / "logs"
     folder.mkdir()

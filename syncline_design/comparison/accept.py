@@ -24,6 +24,7 @@ from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_clock import Resting, by_clock
 from syncline_design.comparison.by_log import by_log
 from syncline_design.comparison.by_stamps import by_stamps
+from syncline_design.comparison.by_unnamed_clock import by_unnamed_clock
 from syncline_design.comparison.departing import Departing
 from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_files
 from syncline_design.comparison.judgement import Judgement, together
@@ -77,11 +78,12 @@ def accept(
     in_force().doing("checking the spec")
     verdict = check_loaded(case, CheckSettings(seed=seed))
     files = evidence_files(case, logs, settings.assigned)
-    rests_on = [one for one in assumptions(case, verdict) if one.name in settings.asked]
+    every = assumptions(case, verdict, files.clocks)
+    rests_on = [one for one in every if one.name in settings.asked]
     evidence = _evidence(case, files, settings, rests_on, seed)
     in_force().doing("weighing the evidence")
-    single = tuple(_row(case, one, evidence) for one in rests_on)
-    rows, groups = _in_groups(case, single, assumptions(case, verdict), evidence)
+    single = tuple(_row(case, one, evidence, seed) for one in rests_on)
+    rows, groups = _in_groups(case, single, every, evidence)
     sound = verdict.verdict == "meets"
     broken_by = tuple(_broken_by(sound, rows, groups))
     return Acceptance(
@@ -157,15 +159,18 @@ def _clocks(case: Case, rests_on: Sequence[Assumed]) -> dict[str, str]:
     return {name: rows[vehicle] for name, vehicle in vehicles.items() if vehicle in rows}
 
 
-def _row(case: Case, one: Assumed, evidence: _Evidence) -> AssumptionResult:
-    return together(case, one, list(_said(case, one, evidence)))
+def _row(case: Case, one: Assumed, evidence: _Evidence, seed: int) -> AssumptionResult:
+    return together(case, one, list(_said(case, one, evidence, seed)))
 
 
-def _said(case: Case, one: Assumed, evidence: _Evidence) -> Iterator[Judgement]:
+def _said(case: Case, one: Assumed, evidence: _Evidence, seed: int) -> Iterator[Judgement]:
     vehicles = {stage.choice.name: stage.choice.vehicle_name for stage in case.stages}
     vehicle = vehicles[one.stage]
     if one.name == "clock" and vehicle in evidence.clocks:
-        yield by_clock(one, evidence.clocks[vehicle], Resting.of(case))
+        study = evidence.clocks[vehicle]
+        named = bool(case.clocks(vehicle))
+        yield (by_clock(one, study, Resting.of(case)) if named
+               else by_unnamed_clock(case, one, vehicle, study, seed))  # fmt: skip
     if one.name == "timing" and f"{one.stage}/{one.role}" in evidence.clocks:
         yield by_clock(one, evidence.clocks[f"{one.stage}/{one.role}"], Resting.of(case))
     stamped = None if evidence.stamps is None else by_stamps(one, evidence.stamps)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Final
 
 from syncline_design.comparison.acceptance import AssumptionName
@@ -44,8 +44,12 @@ class Assumed:
         return _UNITS[self.name]
 
 
-def assumptions(case: Case, verdict: Verdict) -> tuple[Assumed, ...]:
-    """Every assumption of a verdict on a design, stage by stage."""
+def assumptions(case: Case, verdict: Verdict, told: Collection[str] = ()) -> tuple[Assumed, ...]:
+    """Every assumption of a verdict on a design, stage by stage.
+
+    told: vehicles of whose clock there are logs, so that one that the spec does not name is asked
+    for too: its offset is taken as 0.
+    """
     design = verdict.design
     if design is None:
         return ()
@@ -53,7 +57,7 @@ def assumptions(case: Case, verdict: Verdict) -> tuple[Assumed, ...]:
     for stage, named in zip(case.stages, design.stages, strict=True):
         for role in stage.roles:
             found += _of_sensor(stage, role.role, named.roles[role.role])
-        found += _of_vehicle(stage, design, found)
+        found += _of_vehicle(stage, design, found, told)
         found += _of_platform(stage)
     return tuple(found)
 
@@ -68,15 +72,20 @@ def _of_sensor(stage: StageCase, role: RoleName, named: NamedRole) -> Iterator[A
     yield Assumed(name, role, "noise", 1.0, (*key, "sensor"))
 
 
-def _of_vehicle(stage: StageCase, design: NamedDesign, before: list[Assumed]) -> Iterator[Assumed]:
+def _of_vehicle(
+    stage: StageCase, design: NamedDesign, before: list[Assumed], told: Collection[str]
+) -> Iterator[Assumed]:
     """The host clock of a vehicle, at the first of its stages."""
     vehicle = stage.choice.vehicle_name
     clock = next((one for one in design.clocks if one.vehicle == vehicle), None)
     aboard = {one.name for one in design.stages if one.vehicle == vehicle}
-    if clock is None or any(a.name == "clock" and a.stage in aboard for a in before):
+    if any(a.name == "clock" and a.stage in aboard for a in before):
         return
-    key = ("stages", stage.index, "clock")
-    yield Assumed(stage.choice.name, "clock", "clock", clock.offset_bound_s, key)
+    name, key = stage.choice.name, ("stages", stage.index)
+    if clock is not None:
+        yield Assumed(name, "clock", "clock", clock.offset_bound_s, (*key, "clock"))
+    elif vehicle in told:
+        yield Assumed(name, "clock", "clock", 0.0, key)
 
 
 def _of_platform(stage: StageCase) -> Iterator[Assumed]:

@@ -37,9 +37,9 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
         return Judgement("not_shown", f"the clock logs are in doubt: {found.doubts[0]}")
     if found.bound_s is None or one.value is None:
         return Judgement("not_shown", f"the clock logs bound nothing: {found.claim.why_not}")
-    figure = MeasuredFigure(found.bound_s, min(_seen_s(found), found.bound_s), found.bound_s)
+    figure = MeasuredFigure(found.bound_s, min(seen_s(found), found.bound_s), found.bound_s)
     asked, measured = format_duration(one.value), format_duration(found.bound_s)
-    if found.bound_s > one.value and _seen_s(found) <= one.value:
+    if found.bound_s > one.value and seen_s(found) <= one.value:
         said = (f"measured bound {measured}, more than the {asked} assumed, but no session was "
                 "beyond that: more sessions would narrow the bound")  # fmt: skip
         return Judgement("not_shown", said, figure)
@@ -53,7 +53,7 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
     return Judgement(status, lead + (why or _rests_on(found)), figure)
 
 
-def _seen_s(found: Timing) -> float:
+def seen_s(found: Timing) -> float:
     """What these logs themselves show: the worst session, and the daemon's own bound."""
     quantiles = [s.quantile_s or 0.0 for s in found.sessions if s.counted]
     return max([*quantiles, found.hard_bound_s or 0.0])

@@ -103,8 +103,8 @@ def _asked(case: Case, timing: Timing) -> float | None:
     return asked if weaker else None
 
 
-def on_clock(case: Case, study: TimingStudy, identity: str) -> Case:
-    """The case with every vehicle's host clock the measured one."""
+def on_clock(case: Case, study: TimingStudy, identity: str, vehicle: str | None = None) -> Case:
+    """The case with a vehicle's host clock, or every one's, the measured one."""
     currency = case.spec.currency
     entry = ClockEntry.model_validate({
         "name": f"{identity}, measured",
@@ -118,7 +118,11 @@ def on_clock(case: Case, study: TimingStudy, identity: str) -> Case:
     })  # fmt: skip
     clocks = {**case.catalog.clocks, identity: entry}
     only = ClockChoice(candidates=(identity,))
-    stages = tuple(one.model_copy(update={"clock": only}) for one in case.spec.stages)
+    stages = tuple(
+        one.model_copy(update={"clock": only})
+        if vehicle is None or aboard.choice.vehicle_name == vehicle else one
+        for one, aboard in zip(case.spec.stages, case.stages, strict=True)
+    )  # fmt: skip
     return replace(
         case, catalog=case.catalog.model_copy(update={"clocks": clocks}),
         spec=case.spec.model_copy(update={"stages": stages}),
