@@ -114,6 +114,28 @@ def test_damage_that_ends_the_process_of_its_library_ends_none_here(
         open_recording(path).streams()
 
 
+def test_a_sound_cloud_is_unpacked_once_to_be_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the other process alone; what came over are the points that laspy reads itself."""
+    from syncline_design.logs.readers.las import LasRecording
+
+    times = np.sort(np.random.default_rng(3).uniform(0, 6e5, 60_000))
+    path = cloud(tmp_path / "a.laz", times)
+    recording = open_recording(path)
+    with monkeypatch.context() as patch:
+        patch.setattr(LasRecording, "_from", None)
+        found = only(recording)
+    assert (found.messages, found.partial) == (60_000, False)
+    assert np.abs(np.asarray(stamps_of(found)) - laspy.read(path).gps_time * SECOND).max() < 1.0
+    (x, again) = (
+        np.concatenate([piece.columns["point_x_m"] for piece in one.samples("a")])
+        for one in (recording, open_recording(path))
+    )
+    assert np.array_equal(x, np.asarray(laspy.read(path).x))
+    assert np.array_equal(x, again)
+
+
 def test_what_unpacks_before_a_crash_is_read(tmp_path: Path) -> None:
     """The chunk behind 50 000 points is damaged; those of the first are read and are the same."""
     times = np.sort(np.random.default_rng(2).uniform(0, 6e5, 60_000))

@@ -29,7 +29,7 @@ from syncline_design.logs.readers.epochs import (
 )
 from syncline_design.logs.readers.las_header import MAGIC, TIMED, LasClaims, claims_of
 from syncline_design.logs.readers.laz_cut import mended, whole_points
-from syncline_design.logs.readers.laz_probe import CRASH, sound_points
+from syncline_design.logs.readers.laz_probe import CRASH, LENGTH, Outside
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader, library
 from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
@@ -91,14 +91,19 @@ class LasRecording(BatchRecording):
     def clouds(self) -> Iterator[Any]:
         """Points, up to the last that can be read."""
         claims, there = self._claims, self._there()
-        if self.sound is None:
-            self.sound = sound_points(self.path, there) if claims.packed else there
-        said = "" if self.sound >= there else CRASH
-        there = min(there, self.sound)
-        rows, count = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record)), 0
-        while rows and count < there:
+        count = 0
+        if claims.packed and self.sound is None:
+            outside = Outside(self.path)
+            for points in self._unpacked(outside):
+                count += len(points)
+                yield points
+            self.sound = count if outside.died and count < there else there
+        end = there if self.sound is None else min(there, self.sound)
+        said = "" if end == there else CRASH
+        rows = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record))
+        while rows and count < end:
             try:
-                for points in self._from(count, there, rows):
+                for points in self._from(count, end, rows):
                     count += len(points)
                     yield points
             except BadInput:
@@ -111,6 +116,26 @@ class LasRecording(BatchRecording):
             else:
                 break
         self._demand_points(count, said)
+
+    def _unpacked(self, outside: Outside) -> Iterator[Any]:
+        """Points that another process unpacks; it ends where any are damaged."""
+        header = self._header()
+        if header is None:
+            return
+        form = header.point_format
+        for piece in outside.pieces():
+            raw = np.frombuffer(piece, form.dtype())
+            yield self._laspy.ScaleAwarePointRecord(raw, form, header.scales, header.offsets)
+
+    def _header(self) -> Any:
+        """laspy's, and what it says of the frame; None of one that it cannot read."""
+        try:
+            with self.path.open("rb") as file, quiet("laspy"):
+                header = self._laspy.LasHeader.read_from(file)
+        except Exception:  # said by `_record` and `_from`, which read it again
+            return None
+        self._frame, self._zone = _frame(header), _zone(header)
+        return header
 
     def _there(self) -> int:
         """Points that the file is long enough for."""
@@ -216,13 +241,13 @@ class LasRecording(BatchRecording):
 
 
 def tell(path: Path) -> None:
-    """Print the number of points after every piece that unpacks (for `laz_probe`)."""
+    """Write the points piece by piece as they unpack (for `laz_probe`)."""
     recording = LasRecording(path)
     recording.sound = sys.maxsize
-    count = 0
     for points in recording.clouds():
-        count += len(points)
-        print(count, flush=True)
+        raw = points.array.tobytes()
+        sys.stdout.buffer.write(LENGTH.pack(len(raw)) + raw)
+        sys.stdout.buffer.flush()
 
 
 @contextmanager

@@ -1,39 +1,57 @@
-"""How far a packed cloud unpacks, tried in a process of its own: damaged points may end one.
+"""The points of a packed cloud, unpacked in a process of its own: damaged ones may end it.
 
 lazrs 0.8.2 reads outside its memory where the layers of a chunk are damaged; a segmentation fault
-cannot be caught, so it must not happen here.
+cannot be caught, so it must not happen here.  What unpacked there comes over as it is.
 """
 
 from __future__ import annotations
 
+import struct
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.processes import python_command
 
 CRASH: Final = "the library that unpacks its points crashes there"
+LENGTH: Final = struct.Struct("<I")  # of a piece, which follows [bytes]
 _TOLD: Final = (
     "from pathlib import Path; from syncline_design.logs.readers.las import tell; "
     "tell(Path(sys.argv[1]))"
 )
 
 
-def sound_points(path: Path, claimed: int) -> int:
-    """As many points of the claimed ones as unpack before the process that tries it dies."""
-    sound = 0
-    command = [*python_command(_TOLD), str(path)]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL
-    ) as tried:
-        try:
-            assert tried.stdout is not None
-            for line in tried.stdout:  # the number of points after every piece
-                in_force().check()
-                sound = int(line)
-            tried.wait()
-        except BaseException:
-            tried.kill()
-            raise
-    return sound if tried.returncode < 0 and sound < claimed else claimed
+class Outside:
+    """Pieces of unpacked points; died: whether the process that unpacked them crashed."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.died = False
+
+    def pieces(self) -> Iterator[bytes]:
+        """Records as they unpack, up to the last piece that came whole."""
+        command = [*python_command(_TOLD), str(self._path)]
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL
+        ) as unpacking:
+            try:
+                assert unpacking.stdout is not None
+                while piece := _piece(unpacking.stdout):
+                    in_force().check()
+                    yield piece
+                self.died = unpacking.wait() < 0
+            except BaseException:
+                unpacking.kill()
+                raise
+
+
+def _piece(source: IO[bytes]) -> bytes:
+    """The next piece; empty at the end."""
+    head = source.read(LENGTH.size)
+    if len(head) < LENGTH.size:
+        return b""
+    (length,) = LENGTH.unpack(head)
+    found = source.read(length)
+    return found if len(found) == length else b""
