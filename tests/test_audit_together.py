@@ -226,6 +226,20 @@ def test_a_clock_that_is_set_is_told_from_two_streams_one_of_which_slips(
         assert row.residual_s.bound == pytest.approx(delay_s, rel=0.1)
 
 
+def test_stamps_that_go_back_to_places_left_empty_are_no_messages_overtaken(tmp_path: Path) -> None:
+    """Before the first message, and where another wrong stamp left its own place: nobody else was
+    measured when these five were."""
+    t = even(10.0)
+    wrong = np.array([4, 61, 159, 171, 361])
+    stamp = t.copy()
+    stamp[wrong] -= 1.201
+    receive = np.maximum.accumulate(t + np.random.default_rng(9).gamma(2.0, 5e-4, t.size))
+    row = said(tmp_path, stamp, receive)
+    assert set(found(row)) == {"backward_jump"}
+    assert found(row)["backward_jump"].parameters["count"] == wrong.size
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.1)
+
+
 @pytest.mark.parametrize(("seed", "name"), [
     (12, "overtaking_even_lost_messages_counter_wrap_11"),
     (11, "noted_by_threads_even_lost_messages_counter_wrap_11"),

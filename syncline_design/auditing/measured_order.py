@@ -40,6 +40,7 @@ _MOST_FREE: Final = 20_000
 _LONG_GAP: Final = 50.0  # intervals
 _REPEATED: Final = 2.5  # intervals: a message that repeats an older stamp than its last but one
 _COVERED: Final = 0.5  # of the time that passed
+_ALONE, _MOST_ALONE = 0.6, 0.6  # of an interval; of the messages far behind
 _DEEPEST_NS: Final = 2 * 10**9  # a stamp further back was not overtaken
 
 
@@ -83,7 +84,7 @@ def sequence_of(series: Series) -> Sequence | None:
             break
         right &= ~odd
     behind = np.maximum.accumulate(np.where(right, key, key.min())) - key
-    right &= behind <= _DEEPEST_NS
+    right &= (behind <= _DEEPEST_NS) & ~_displaced(key, away, right, behind)
     period = _kept(key[right]) if float(np.mean(right)) > 1.0 - _MOST_ODD else None
     if period is None:
         return None
@@ -267,6 +268,25 @@ def _wrong(key: NDArray[np.int64], away: Array, right: Mask) -> Mask:
     after = np.append(change, 0.0)[same + 1] < 1.5 * period[same]  # its own place is not empty
     wrong[later[(change[same] > 0.0) | (old & after)]] = True
     return wrong
+
+
+def _displaced(
+    key: NDArray[np.int64], away: Array, right: Mask, behind: NDArray[np.int64]
+) -> Mask:  # fmt: skip
+    """Messages far behind others, where for most of these nobody else was measured when they must
+    have been by their receipts: they were then, and their stamps are wrong."""
+    none = np.zeros(key.size, bool)
+    period = float(np.median(_periods(np.diff(np.sort(key[right])).astype(np.float64))))
+    far = np.flatnonzero(right & (behind > _REPEATED * period))
+    if not far.size:
+        return none
+    taken, own = np.sort(key[right]), key[far] + away[far]
+    after = np.clip(np.searchsorted(taken, own), 1, taken.size - 1)
+    nearest = np.minimum(np.abs(taken[after] - own), np.abs(own - taken[after - 1]))
+    alone = nearest > _ALONE * period
+    if float(np.mean(alone)) >= _MOST_ALONE:
+        none[far[alone]] = True
+    return none
 
 
 def _periods(change: Array) -> Array:
