@@ -26,7 +26,20 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash on this machine")
-@pytest.mark.parametrize(("words", "wanted"), [("ch", {"check"}), ("schema aud", {"audit"})])
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        ("ch", {"check"}),
+        ("schema aud", {"audit"}),
+        ("catalog show velodyne_h", {"velodyne_hdl32e"}),
+        ("catalog list se", {"sensors"}),
+        ("catalog list --modality r", {"ranging"}),
+        ("catalog list --medium w", {"water"}),
+        ("catalog add --from-template lid", {"lidar", "lidar_2d"}),
+        ("optimize specs/x.yaml --road mi", {"milp"}),
+        ("check specs/x.yaml -o ju", {"junit:"}),
+    ],
+)
 def test_bash_completes(tmp_path: Path, words: str, wanted: set[str]) -> None:
     command = tmp_path / "syncline-design"
     command.write_text(f'#!/bin/sh\nexec {sys.executable} -P -m syncline_design "$@"\n', "utf-8")
@@ -38,6 +51,19 @@ def test_bash_completes(tmp_path: Path, words: str, wanted: set[str]) -> None:
                           timeout=120, check=True)  # fmt: skip
     assert set(done.stdout.split()) == wanted
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_is_one_line_on_any_terminal(name: str) -> None:
+    """So what is copied from a help is the whole call; a terminal alone shows it in several."""
+    shown = CliRunner().invoke(app, [*name.split(), "--help"], env={"COLUMNS": "80"}).output
+    assert f" Example: syncline-design {name} {EXAMPLES[name]}\n" in shown
+
+
+def test_a_command_without_pages_does_not_speak_of_them() -> None:
+    for name, has_pages in {"catalog show": False, "catalog list": False, "check": True}.items():
+        shown = CliRunner().invoke(app, [*name.split(), "--help"], env={"COLUMNS": "200"}).output
+        assert ("html" in shown) is has_pages
 
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -234,3 +234,16 @@ def test_prices_in_two_currencies_are_never_compared(tmp_path: Path, more: str) 
         assert f"{shown} USD" not in page
     assert "cost [" not in page
     assert "fronts are drawn" not in page
+
+
+@pytest.mark.parametrize("width", [80, 100, 160])
+def test_a_map_names_both_factors_on_a_narrow_console(
+    tmp_path: Path, width: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows that become records would else be figures of nobody knows what."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    text = console(on_study(done(tmp_path, GRID.format(across=5, up=5))), colour=False)
+    block = text[text.index("Least cost of a payload") :].split("\n\n")[0]
+    assert "stages[uav].distance" in block
+    assert "requirements[ACC-1].limit" in block
+    assert max(map(len, block.splitlines())) <= width

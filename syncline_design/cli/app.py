@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from syncline_design import __version__
 from syncline_design.cli import (
@@ -43,6 +43,21 @@ class _Commands(TyperGroup):
                 shown = argument or '""'
                 ctx.fail(f"an empty argument ({shown}); expected a path or a value")
         return super().parse_args(ctx, args)
+
+
+class _Command(TyperCommand):
+    """A command whose help ends with an example, in one line however long: a terminal shows it in
+    several, yet what is copied from there is one call again.
+    """
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        super().format_help(ctx, formatter)
+        words: list[str] = []
+        while ctx.parent is not None:
+            words.insert(0, ctx.info_name)
+            ctx = ctx.parent
+        name = " ".join(words)
+        typer.echo(f" Example: syncline-design {name} {EXAMPLES[name]}\n")
 
 
 app = typer.Typer(
@@ -87,7 +102,7 @@ def _add(name: str, run: Callable[..., None]) -> None:
     """A command, by its name after the program's, with an example below its help."""
     group, _, own = name.rpartition(" ")
     home = {"": app, "catalog": catalog, "log": log}[group]
-    home.command(own, epilog=f"Example: syncline-design {name} {EXAMPLES[name]}")(run)
+    home.command(own, cls=_Command)(run)
 
 
 COMMANDS: dict[str, Callable[..., None]] = {

@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from syncline_design.cli.completions import (
+    MEDIA,
+    among,
+    catalog_ids,
+    catalog_sections,
+    one_of,
+    stub_types,
+)
 from syncline_design.cli.shared import (
     QuietOption,
     emit,
@@ -30,10 +38,17 @@ CatalogOutput = Annotated[list[str] | None, output_option(CATALOG_FORMATS)]
 def catalog_list(
     section: Annotated[
         str | None,
-        typer.Argument(help="platforms, sensors, timestamping, infrastructure or clocks."),
+        typer.Argument(
+            help="platforms, sensors, timestamping, infrastructure or clocks.",
+            autocompletion=among(catalog_sections),
+        ),
     ] = None,
     modality: Annotated[
-        str | None, typer.Option(help="Sensors of this modality: position, attitude, ranging.")
+        str | None,
+        typer.Option(
+            help="Sensors of this modality: position, attitude, ranging.",
+            autocompletion=one_of(*ROLES),
+        ),
     ] = None,
     kind: Annotated[
         str | None, typer.Option("--type", metavar="TYPE", help="Sensors of this type.")
@@ -42,7 +57,10 @@ def catalog_list(
         str | None, typer.Option(metavar="LENGTH", help="Sensors that measure this far: 120 m.")
     ] = None,
     medium: Annotated[
-        str | None, typer.Option(help="Sensors that measure through air or water.")
+        str | None,
+        typer.Option(
+            help="Sensors that measure through air or water.", autocompletion=one_of(*MEDIA)
+        ),
     ] = None,
     max_cost: Annotated[
         str | None, typer.Option(metavar="MONEY", help="Sensors up to this price: 5000 EUR.")
@@ -82,7 +100,7 @@ def _wanted(
 
     for option, word, known in (
         ("--modality", modality, ROLES),
-        ("--medium", medium, ("air", "water")),
+        ("--medium", medium, MEDIA),
     ):
         if word is not None and word not in known:
             refuse(f"syncline-design: {option} {word}: expected one of {', '.join(known)}")
@@ -98,7 +116,7 @@ def _wanted(
 
 @guarded
 def catalog_show(
-    identity: Annotated[str, typer.Argument(metavar="ID")],
+    identity: Annotated[str, typer.Argument(metavar="ID", autocompletion=among(catalog_ids))],
     output: CatalogOutput = None,
     quiet: QuietOption = False,
 ) -> int:
@@ -146,7 +164,13 @@ def catalog_check(
 @guarded
 def catalog_add(
     kind: Annotated[
-        str, typer.Option("--from-template", metavar="TYPE", help="Kind of entry: lidar, gnss, ...")
+        str,
+        typer.Option(
+            "--from-template",
+            metavar="TYPE",
+            help="Kind of entry: lidar, gnss, ...",
+            autocompletion=among(stub_types),
+        ),
     ],
     to: Annotated[
         Path | None, typer.Option("--to", metavar="FILE", help="Catalog file that it is put into.")

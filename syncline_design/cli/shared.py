@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, Protocol
 
 import typer
 
+from syncline_design.cli.completions import SOLVER_ROADS, format_words, one_of
 from syncline_design.machine.streams import say, without_commands
 from syncline_design.report import formats
 
@@ -43,7 +44,12 @@ SeedOption = Annotated[int, typer.Option(min=0, help="Seed of every random numbe
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No text, only the exit code.")]
 RoadOption = Annotated[
     str,
-    typer.Option("--road", "--method", help="To the proof: auto, front, milp or enumerate."),
+    typer.Option(
+        "--road",
+        "--method",
+        help="To the proof: auto, front, milp or enumerate.",
+        autocompletion=one_of(*SOLVER_ROADS),
+    ),
 ]
 TimeLimitOption = Annotated[
     float | None,
@@ -61,8 +67,10 @@ def output_option(formats: tuple[str, ...]) -> Any:
         "--output",
         "-o",
         metavar="FORMAT:PATH",
+        autocompletion=format_words(formats),
         help=f"Write the result too; formats: {', '.join(formats)}; repeatable; path `-` is "
-        "standard output, no path a file named after the input for html"
+        "standard output"
+        + (", no path a file named after the input for html" if "html" in formats else "")
         + ("; svg and png: a folder." if "svg" in formats else "."),
     )
 
@@ -289,7 +297,6 @@ def watched(
 
 
 def known_road(name: str) -> Any:
-    known = ("auto", "front", "milp", "enumerate")
-    if name not in known:
-        refuse(f"syncline-design: --road {name}: expected one of {', '.join(known)}")
+    if name not in SOLVER_ROADS:
+        refuse(f"syncline-design: --road {name}: expected one of {', '.join(SOLVER_ROADS)}")
     return name

@@ -89,7 +89,7 @@ def accept(
     return Acceptance(
         verdict="broken" if broken_by else worst(row.status for row in rows),
         broken_by=broken_by,
-        spec=AcceptedSpec(verdict.name, verdict.file, verdict.verdict),
+        spec=AcceptedSpec(verdict.name, verdict.file, verdict.verdict, verdict.provenance),
         asked=settings.asked,
         assumptions=rows,
         evidence=tuple(files.records),

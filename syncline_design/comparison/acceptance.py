@@ -8,7 +8,7 @@ from typing import Annotated, Final, Literal
 from syncline_design.effects.record import Promise
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
-from syncline_design.verdict.tree import Word
+from syncline_design.verdict.tree import Provenance, Word
 
 SCHEMA: Final = "syncline-design/acceptance/v1"
 AssumptionStatus = Literal["holds", "broken", "not_shown"]
@@ -126,6 +126,7 @@ class AcceptedSpec(Record):
     name: str
     file: str
     verdict: Word
+    provenance: Provenance | None = optional()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from syncline_design.comparison.diff_result import Cause, Diff, changes, diff_of
+from syncline_design.comparison.diff_result import Cause, Compared, Diff, changes, diff_of
 from syncline_design.comparison.limits import limit_texts
 from syncline_design.comparison.verdict_file import read_verdict, text_of
 from syncline_design.machine.deadline import NoVerdict, in_force
@@ -57,12 +57,12 @@ def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None
     causes = list(_causes(before, after))
     if before.case is not None and after.case is not None and 1 < len(causes) <= MOST_TRIED:
         causes = [(_tried(cause, path, before, after, chosen), path) for cause, path in causes]
-    return diff_of(
-        (before.file, after.file),
-        tuple(cause for cause, _ in causes),
-        changes(before.verdict, after.verdict),
-        after.verdict.exit_code,
+    found = changes(before.verdict, after.verdict)
+    sides = (
+        Compared(before.file, found.verdict.old, before.verdict.provenance),
+        Compared(after.file, found.verdict.new, after.verdict.provenance),
     )
+    return diff_of(sides, tuple(cause for cause, _ in causes), found, after.verdict.exit_code)
 
 
 def read_side(path: Path, settings: CheckSettings) -> Side:

@@ -8,17 +8,18 @@ from typing import Annotated
 from syncline_design.comparison.limits import beyond
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
-from syncline_design.verdict.tree import RequirementResult, Status, Verdict, Word
+from syncline_design.verdict.tree import Provenance, RequirementResult, Status, Verdict, Word
 
 SCHEMA = "syncline-design/diff/v1"
 
 
 @dataclass(frozen=True, slots=True)
 class Compared(Record):
-    """One of the two files, and the verdict on it."""
+    """One of the two files, the verdict on it, and what that depends on."""
 
     file: str
     verdict: Word
+    provenance: Provenance | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,12 +149,14 @@ class Diff(Record):
 
 
 def diff_of(
-    files: tuple[str, str], causes: tuple[Cause, ...], found: VerdictChanges, exit_code: int
+    sides: tuple[Compared, Compared],
+    causes: tuple[Cause, ...],
+    found: VerdictChanges,
+    exit_code: int,
 ) -> Diff:
     """The whole of it from its parts."""
-    old, new = files
     return Diff(
-        SCHEMA, Compared(old, found.verdict.old), Compared(new, found.verdict.new), causes,
+        SCHEMA, *sides, causes,
         found.verdict, found.currency, found.payload, found.sums, found.error,
         found.requirements, exit_code, found.outgrown, found.admitted,
     )  # fmt: skip

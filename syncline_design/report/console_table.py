@@ -7,7 +7,7 @@ from itertools import zip_longest
 from textwrap import wrap
 from typing import Final
 
-from syncline_design.report.table import Table, Tone, cell_words
+from syncline_design.report.table import CORNER, Table, Tone, cell_words
 from syncline_design.report.text import visible
 
 GAP: Final = "  "
@@ -97,7 +97,12 @@ def _row(
 
 
 def _records(heads: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> Iterator[str]:
-    """Each row as a record: its name, then a line for every other cell that says something."""
+    """Each row as a record: its name, then a line for every other cell that says something.
+
+    A corner that names both sides of a table is kept: nothing else says what its figures are.
+    """
+    if CORNER in heads[0]:
+        yield from folded(heads[0], room, indent=GAP)
     for row in rows:
         yield from folded(row[0] or "-", room, indent=GAP)
         for head, text in zip(heads[1:], row[1:], strict=True):

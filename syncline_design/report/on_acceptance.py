@@ -31,6 +31,7 @@ from syncline_design.report.junit import junit_text, suite_of
 from syncline_design.report.rendered import rendered
 from syncline_design.report.sarif import sarif_log
 from syncline_design.report.table import Cell, Table, Tone, table
+from syncline_design.report.verdict_words import pinned_by
 
 _OUTCOMES: Final[dict[AssumptionStatus, tuple[Tone, str, str]]] = {
     "holds": ("good", "\u2713", "holds"),
@@ -66,10 +67,17 @@ def on_acceptance(result: Acceptance) -> Document:
             *section("groups", "One of these is broken", _groups(result), "One of these"),
             *section("notes", "What the logs said besides", _notes(result), "Notes"),
             *section("evidence", "Evidence", show(_evidence(result), silent=True)),
-            *provenance([("syncline-design", result.version), ("seed", str(result.seed))]),
+            *provenance(_provenance(result)),
         ),
         title=f"Acceptance: {result.spec.name}",
     )  # fmt: skip
+
+
+def _provenance(result: Acceptance) -> list[tuple[str, str]]:
+    """What the figures are pinned by, the spec's content where it is known."""
+    if result.spec.provenance is not None:
+        return [("Spec file", result.spec.file), *pinned_by(result.spec.provenance)]
+    return [("syncline-design", result.version), ("Seed", str(result.seed))]
 
 
 def _outcome(result: Acceptance) -> Outcome:

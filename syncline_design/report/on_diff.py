@@ -17,12 +17,20 @@ from syncline_design.comparison.diff_result import (
 )
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
-from syncline_design.report.document import Document, Items, Node, Outcome, section, show
+from syncline_design.report.document import (
+    Document,
+    Items,
+    Node,
+    Outcome,
+    provenance,
+    section,
+    show,
+)
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import kind_words, status_word, with_waived
+from syncline_design.report.verdict_words import kind_words, pinned_by, status_word, with_waived
 from syncline_design.report.words import KINDS, OUTCOMES
 from syncline_design.verdict.tree import PREDICATES
 
@@ -57,8 +65,19 @@ def on_diff(data: Diff) -> Document:
             *section("payload", "Payload", show(_payload(data), silent=True)),
             *section("sums", "Sums", show(_sums(data), silent=True)),
             *section("margins", "Requirements", show(_margins(data), silent=True)),
+            *provenance(_provenance(data)),
         ),
     )
+
+
+def _provenance(data: Diff) -> list[tuple[str, str]]:
+    """What either side is pinned by."""
+    return [
+        (f"{word}: {name}", text)
+        for word, one in (("Before", data.old), ("Now", data.new))
+        if one.provenance is not None
+        for name, text in pinned_by(one.provenance)
+    ]
 
 
 def _outcome(data: Diff, side: Literal["old", "new"]) -> Outcome:

@@ -68,10 +68,20 @@ def on_simulation(result: Simulation, system: System | None = None) -> Document:
             ),
             *section("errors", "Distribution of the error", _errors(result), "Errors"),
             *section("effects", "Known effects acting", _effects(system), "Known effects"),
-            *provenance([*([("Spec file", file)] if file else []), *result.versions.items()]),
+            *provenance(_provenance(result)),
         ),
         source=file,
     )
+
+
+def _provenance(result: Simulation) -> list[tuple[str, str]]:
+    """What the figures are pinned by: files by their content, seed, versions."""
+    content, spec = result.provenance, result.spec
+    files = [("Spec file", spec.file)] if spec is not None and spec.file else []
+    hashes = [] if content is None else [
+        ("Spec, SHA-256", content.spec_sha256), ("Catalogs, SHA-256", content.catalogs_sha256),
+    ]  # fmt: skip
+    return [*files, *hashes, ("Seed", str(result.monte_carlo.seed)), *result.versions.items()]
 
 
 def _outcome(grid: tuple[ComparisonRow, ...]) -> Outcome:

@@ -324,15 +324,7 @@ def _basis(verdict: Verdict) -> list[Node]:
 def _provenance(verdict: Verdict) -> list[Section]:
     """In full on the page; in one line elsewhere."""
     found = verdict.provenance
-    full = [
-        ("Spec file", verdict.file),
-        ("syncline-design", found.version),
-        ("Spec, SHA-256", found.spec_sha256),
-        ("Catalogs, SHA-256", found.catalogs_sha256),
-        ("Seed", str(found.seed)),
-        ("Python", found.python),
-        ("NumPy", found.numpy),
-    ]
+    full = [("Spec file", verdict.file), *verdict_words.pinned_by(found)]
     line = (
         f"syncline-design {found.version}, spec {found.spec_sha256[:12]}, "
         f"catalogs {found.catalogs_sha256[:12]}, seed {found.seed}"

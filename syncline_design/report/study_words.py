@@ -5,7 +5,7 @@ from __future__ import annotations
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
-from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.table import CORNER, Cell, Table, table
 from syncline_design.report.words import OUTCOMES, VERBS
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (
@@ -82,7 +82,7 @@ def heat_table(heat: HeatMap) -> Table:
         costs = tuple(zip(*heat.least_cost, strict=True))
     if len(names) > MOST_ACROSS:
         return _cell_table(heat)
-    heads = [f"{down} \\ {across}", *(f"{text} #" for text in names)]
+    heads = [f"{down}{CORNER}{across}", *(f"{text} #" for text in names)]
     rows = [
         [Cell(name), *(_cost_cell(cost, heat.currency) for cost in line)]
         for name, line in zip(sides, costs, strict=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Literal
+from typing import Final, Literal
 
 from syncline_design.machine.quick_dataclass import dataclass
 
 Tone = Literal["", "good", "bad", "warn", "muted"]
+CORNER: Final = " \\ "  # in a first heading: between what goes down and what goes across
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from syncline_design.verdict.tree import (
         Caution,
         Checked,
+        Provenance,
         RequirementResult,
         Status,
         Verdict,
@@ -206,3 +207,15 @@ def selection_reason(verdict: Verdict, stage: str, role: str) -> str:
         return f"chosen for {word} of the whole design"
     plural = "option" if count == 1 else "options"
     return f"chosen for {word} of the whole design; {count} {plural} ruled out before"
+
+
+def pinned_by(found: Provenance) -> list[tuple[str, str]]:
+    """What a verdict's figures are pinned by, for the last lines of a report."""
+    return [
+        ("syncline-design", found.version),
+        ("Spec, SHA-256", found.spec_sha256),
+        ("Catalogs, SHA-256", found.catalogs_sha256),
+        ("Seed", str(found.seed)),
+        ("Python", found.python),
+        ("NumPy", found.numpy),
+    ]
