@@ -22,6 +22,7 @@ from syncline_design.model.figure_text import to_digits
 
 _WHOLE_NS: Final = 5e7  # from whole seconds
 _MOST: Final = 0.8
+_IN_A_ROW: Final = 1.5  # messages of a slip on the average; fewer are single ones
 _PAIRS: Final = 0.9  # of all disordered stretches: two messages each
 _MOST_PAIRED: Final = 0.6  # of all messages
 _EARLY: Final = 0.2  # of an interval before the fastest message near by
@@ -69,7 +70,7 @@ def disorder_of(series: Series) -> Disorder:
     if sequence is None or series.receive is None:
         return Disorder()
     overtaken = sequence.behind_ns > 0.0
-    if not overtaken.any() or _in_whole_seconds(sequence.away_ns[overtaken]):
+    if not overtaken.any() or _in_whole_seconds(sequence.away_ns, overtaken):
         return Disorder(wrong=None if overtaken.any() else sequence.wrong)
     order = sequence.order
     rank = np.cumsum(series.good) - 1
@@ -89,10 +90,18 @@ def disorder_of(series: Series) -> Disorder:
     )  # fmt: skip
 
 
-def _in_whole_seconds(away: NDArray[np.float64]) -> bool:
-    """Whether what seems overtaken is late by the same whole seconds: slips of single stamps."""
+def _in_whole_seconds(away_ns: NDArray[np.float64], overtaken: Mask) -> bool:
+    """Whether what seems overtaken is late by the same whole seconds, several in a row: a slip.
+
+    Single ones took the place of the rhythm that is theirs, or would be among the wrong: they were
+    sent again a second later.
+    """
+    away = away_ns[overtaken]
     whole = round(float(np.median(away)) / NS)
-    return whole != 0 and float(np.mean(np.abs(away - whole * NS) < _WHOLE_NS)) > _MOST
+    if whole == 0 or float(np.mean(np.abs(away - whole * NS) < _WHOLE_NS)) <= _MOST:
+        return False
+    begins = int(np.sum(np.diff(np.concatenate([[False], overtaken]).astype(np.int8)) > 0))
+    return away.size > _IN_A_ROW * begins
 
 
 def _exchanged(

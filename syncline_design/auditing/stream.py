@@ -22,6 +22,7 @@ from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.disorder import Disorder, disorder_of
 from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
 from syncline_design.auditing.levels import smallest
+from syncline_design.auditing.lone_slips import without_lone_slips
 from syncline_design.auditing.receipts import in_order_of_receipt, with_receipts_forward
 from syncline_design.auditing.residual import LATE_OR_COARSE, residual_of
 from syncline_design.auditing.result import (
@@ -95,6 +96,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     raw = in_order_of_receipt(series_of(stamps.primary_ns, _receipts(stamps), start))
     found: list[StampFault] = []
     series, unit, step_ns = _in_one_unit(raw, found, stamps.primary_factor)
+    series = _take(without_lone_slips(series), found)
     disorder = disorder_of(series)
     series = disorder.put(series)
     if disorder.fault is None:
@@ -320,7 +322,7 @@ def _summed(
     faults = tuple(found)
     return Examined(
         stream, raw, whole, series, faults, (*moved[0].shifts, *moved[1].shifts), pace,
-        _offset(raw), residual_of(raw, series, faults), _smallest(moved[1].blocks),
+        _offset(raw, series), residual_of(raw, series, faults), _smallest(moved[1].blocks),
         _trace(raw) if told else (), constant, moved[1].blocks, moved[1].seen, moved[1].breathing_s,
     )  # fmt: skip
 
@@ -345,11 +347,13 @@ def _smallest(blocks: Blocks | None) -> SmallestSeen:
     return SmallestSeen(step, 1e6 * over / length)
 
 
-def _offset(raw: Series) -> float | None:
-    """Stamp minus receipt of the fastest message as the file has it [s]."""
-    if raw.receive is None or not raw.good.any():
+def _offset(raw: Series, series: Series) -> float | None:
+    """Stamp minus receipt of the fastest message as the file has it [s], but for those that were
+    left out, of which one alone may be far off."""
+    told = raw.good & series.good if bool(np.any(raw.good & series.good)) else raw.good
+    if raw.receive is None or not told.any():
         return None
-    return float(seconds(np.max((raw.stamp - raw.receive)[raw.good])))
+    return float(seconds(np.max((raw.stamp - raw.receive)[told])))
 
 
 def _trace(raw: Series) -> tuple[EnvelopePoint, ...]:
