@@ -114,6 +114,21 @@ def test_damage_that_ends_the_process_of_its_library_ends_none_here(
         open_recording(path).streams()
 
 
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+@pytest.mark.parametrize("behind", [1, 900])
+def test_records_behind_the_points_may_be_lost(tmp_path: Path, name: str, behind: int) -> None:
+    """They are what a cut takes first; every point is there still."""
+    path = cloud(tmp_path / name, 245_000.0 + 0.25 * np.arange(1000))
+    las = laspy.read(path)
+    las.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("made", 7, "", b"x" * 1000)])
+    las.write(path)
+    whole = path.read_bytes()
+    assert whole.endswith(b"x" * 900)
+    path.write_bytes(whole[:-behind])
+    recording = open_recording(path)
+    assert only(recording).messages == 1000
+
+
 def test_a_sound_cloud_is_unpacked_once_to_be_listed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -187,7 +202,6 @@ def patched(path: Path, at: int, code: str, value: int) -> Path:
         (100, "<I", 2**31, "number of records"),
         (104, "<B", 77, "point format"),
         (105, "<H", 3, "length of a point"),
-        (243, "<I", 2**31, "number of records"),
     ],
 )
 def test_absurd_headers_are_refused(
@@ -196,6 +210,15 @@ def test_absurd_headers_are_refused(
     path = patched(cloud(tmp_path / "a.las", np.arange(50.0)), at, code, value)
     with pytest.raises(BadInput, match=words):
         open_recording(path).streams()
+
+
+@pytest.mark.parametrize(("at", "code"), [(235, "<Q"), (243, "<I")])
+@pytest.mark.parametrize("name", ["a.las", "a.laz"])
+def test_absurd_records_behind_the_points_are_not_read(
+    tmp_path: Path, name: str, at: int, code: str
+) -> None:
+    path = patched(cloud(tmp_path / name, np.arange(50.0)), at, code, 2**31)
+    assert only(open_recording(path)).messages == 50
 
 
 def test_a_cloud_that_unpacks_to_too_much_is_refused(tmp_path: Path) -> None:

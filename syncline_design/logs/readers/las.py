@@ -185,10 +185,11 @@ class LasRecording(BatchRecording):
     def _reader(self, file: BinaryIO) -> Any:
         """laspy's, unpacking from front to back: a cut file has lost its table of chunks."""
         if not self._claims.packed:
-            return self._laspy.open(file, closefd=False)
+            return self._laspy.open(file, closefd=False, read_evlrs=False)
         source = mended(self.path, file, self._claims, self._record())
         source.seek(0)
-        return self._laspy.open(source, closefd=False, laz_backend=self._laspy.LazBackend.Lazrs)
+        backend = self._laspy.LazBackend.Lazrs
+        return self._laspy.open(source, closefd=False, laz_backend=backend, read_evlrs=False)
 
     def _stamps(self, times: NDArray[np.float64]) -> Nanoseconds:
         stamps = nanoseconds_of(times)

@@ -18,7 +18,7 @@ LEAST_RECORD = {
     **{0: 20, 1: 28, 2: 26, 3: 34, 4: 57, 5: 63},
     **{6: 30, 7: 36, 8: 38, 9: 59, 10: 67},
 }
-VLR_HEAD, EVLR_HEAD = 54, 60
+VLR_HEAD = 54
 COMPRESSED = 0x80  # bit of the point format that LAZ sets
 COPC = 0x40
 RATIO, FREE_BYTES = 200, 1 << 30  # points may unpack to so many times the file, and this much
@@ -47,9 +47,8 @@ def claims_of(path: Path, start: bytes, size: int) -> LasClaims:
         raise refuse(path, "the LAS header is cut", expected=f"{least} bytes", found=str(size))
     (encoding,) = struct.unpack_from("<H", start, 6)
     head, offset, vlrs, kind, record, points = struct.unpack_from("<HIIBHI", start, 94)
-    evlr_at = evlrs = 0
     if minor == 4:
-        evlr_at, evlrs, wide = struct.unpack_from("<QIQ", start, 235)
+        (wide,) = struct.unpack_from("<Q", start, 247)
         points = wide or points
     packed, form = bool(kind & COMPRESSED), kind & ~(COMPRESSED | COPC)
     if form not in LEAST_RECORD:
@@ -59,15 +58,12 @@ def claims_of(path: Path, start: bytes, size: int) -> LasClaims:
         (offset > size or offset < head, "offset to points", f"{head} to {size}", offset),
         (vlrs * VLR_HEAD > max(offset - head, 0), "number of records", "what the file holds", vlrs),
         (record < LEAST_RECORD[form], "length of a point", f"{LEAST_RECORD[form]} or more", record),
-        (evlrs * EVLR_HEAD > max(size - evlr_at, 0), "number of records", "that fits", evlrs),
     )
     for wrong, what, expected, found in faults:
         if wrong:
             message = f"the LAS header's {what} cannot be"
             raise refuse(path, message, expected=expected, found=str(found))
     _demand_fitting_records(path, head, vlrs, offset)
-    if evlrs:
-        _demand_fitting_records(path, evlr_at, evlrs, size, wide=True)
     if packed and points * record > FREE_BYTES + RATIO * size:
         most = f"{RATIO} times the file's size and 1 GiB"
         raise refuse(
@@ -77,15 +73,17 @@ def claims_of(path: Path, start: bytes, size: int) -> LasClaims:
     return LasClaims(f"{major}.{minor}", form, record, points, offset, timed, packed)
 
 
-def _demand_fitting_records(path: Path, at: int, count: int, end: int, wide: bool = False) -> None:
-    """Variable length records one behind the other, each within the bytes that are there."""
-    head, place, code = (EVLR_HEAD, 20, "<Q") if wide else (VLR_HEAD, 20, "<H")
+def _demand_fitting_records(path: Path, at: int, count: int, end: int) -> None:
+    """Variable length records one behind the other, each within the bytes that are there.
+
+    Those behind the points are not read: a file that was cut has lost them first.
+    """
     with path.open("rb") as file:
         for number in range(count):
             file.seek(at)
-            raw = file.read(head)
-            length = struct.unpack_from(code, raw, place)[0] if len(raw) == head else end
-            at += head + length
+            raw = file.read(VLR_HEAD)
+            length = struct.unpack_from("<H", raw, 20)[0] if len(raw) == VLR_HEAD else end
+            at += VLR_HEAD + length
             if at > end:
                 raise refuse(
                     path,
