@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from syncline_design.cli.app import app
 from syncline_design.logs.readers import open_recording
+from syncline_design.spec.load import BadInput
 from tests.flight_logs import (
     flight,
     ulog_bytes,
@@ -263,3 +264,16 @@ def test_a_chunk_that_ends_with_the_file_is_read_as_far_as_it_unpacks(
     np.testing.assert_array_equal(logged, 10**9 + 1000 * np.arange(stream.messages))
     assert recording.incomplete is not None
     assert "within a chunk" in recording.incomplete.reason
+
+
+@pytest.mark.parametrize(("name", "start"), [
+    ("a.bag", b"#ROSBAG V2.0\n\x45\x00\x00\x00"), ("a.mcap", b"\x89MCAP0\r\n\x01"),
+    ("a.ulg", b"ULog\x01\x12\x35\x01" + bytes(8) + b"\x05\x00F"),
+])  # fmt: skip
+def test_a_file_cut_in_its_head_is_refused_with_what_to_do(
+    tmp_path: Path, name: str, start: bytes
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(start)
+    with pytest.raises(BadInput, match="copy the file once more"):
+        open_recording(path).streams()

@@ -39,6 +39,7 @@ MOST_TOPICS = 20_000
 LONGEST_NAME = 1_000  # characters of a topic or a type
 RATIO, FREE_BYTES = 200, 1 << 30  # a file may unpack to this many times its size, and this much
 RECORDED = "log time"
+DAMAGED = "copy the file once more, or let the recorder's own tool repair it"
 
 
 class DamagedError(Exception):
@@ -125,8 +126,12 @@ class Container(ABC):
             if self.cut:
                 self.incomplete = Incomplete(self.cut, count)
         if not count and self.incomplete is not None and self.wanted is None:
-            raise refuse(self.path, f"no message of this {self.format} can be read",
-                         found=self.incomplete.reason)  # fmt: skip
+            raise refuse(
+                self.path,
+                f"no message of this {self.format} can be read",
+                found=self.incomplete.reason,
+                hint=DAMAGED,
+            )
 
 
 @dataclass(slots=True)

@@ -102,8 +102,13 @@ class ULogRecording:
         partial = self.incomplete is not None
         found = [_stream(topic, partial) for topic in topics.values()]
         if not found:
-            raise refuse(self.path, "no readable ULog", expected="topics with data",
-                         found=self.incomplete.reason if self.incomplete else "none")  # fmt: skip
+            raise refuse(
+                self.path,
+                "no readable ULog",
+                expected="topics with data",
+                found=self.incomplete.reason if self.incomplete else "none",
+                hint="copy the file once more from the vehicle",
+            )
         return tuple(sorted(found, key=lambda one: one.name))
 
     def samples(self, name: str) -> Iterator[Piece]:
