@@ -281,6 +281,18 @@ def test_a_waived_simulated_requirement_that_can_be_kept_is_kept(tmp_path: Path)
     assert any("the waiver is not needed" in one["message"] for one in verdict["warnings"])
 
 
+def test_a_waived_limit_is_held_with_the_probability_that_is_asked_for(tmp_path: Path) -> None:
+    """Nine figures of ten: of p those to 0.28 m an axis, of q, dearer and worse at best, 0.24 m."""
+    sensors: dict[str, Any] = dict.fromkeys(SENSORS, (0.5, 1))
+    sensors |= {"p": ("0.10 m .. 0.30", 5), "q": ("0.15 m .. 0.25", 9)}
+    limit = sums("accuracy", "0.20 m", "ACC") | {"waiver": WAIVER}
+    loaded = spec(tmp_path, [limit], sensors=sensors, choose_for=0.9)
+    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()
+    assert (verdict["verdict"], position(verdict["design"])) == ("meets", "q")
+    rows = {row["id"]: row["status"] for row in verdict["requirements"]}
+    assert rows == {"SYNC": "pass", "ACC": "fail", "CHOOSE_FOR": "pass"}
+
+
 def tolerances_of_c(loaded: Case) -> ToleranceVerdict:
     build = Simulations().problem_of
     problem = build(loaded)

@@ -415,3 +415,21 @@ def test_the_random_families_are_of_every_kind() -> None:
     sizes = [None if (n := nearest_payload(s, e)) is None else len(n[0])
              for s, _, e in map(family_problem, range(10))]  # fmt: skip
     assert {None, 0, 2, 4} <= set(sizes)
+
+
+@pytest.mark.parametrize("missions", [False, True])
+def test_a_waived_sample_spacing_lets_the_fastest_sensor_in(missions: bool, tmp_path: Path) -> None:
+    """At 10 m/s samples of 5, 6 and 7 Hz are 2, 1.667 and 1.429 m apart; asked are 0.2 m."""
+    spec, own, _ = problem(0)
+    for place in range(3):
+        own["sensors"][f"ranging{place}"]["rate"] = f"{5 + place} Hz"
+    limit = {"id": "GAP", "kind": "sample_spacing", "limit": "0.2 m", "waiver": dict(WAIVER)}
+    spec["requirements"] = [limit, {"id": "SYNC", "kind": "sync", "limit": 10}]
+    if missions:
+        spec["missions"] = [{"name": "one"}, {"name": "other"}]
+    verdict = check(spec, own, tmp_path)
+    assert verdict.verdict == "meets"
+    assert verdict.design is not None
+    assert verdict.design.stages[0].roles["ranging"].sensor == "ranging2"
+    row = next(row for row in verdict.requirements if row.id == "GAP")
+    assert (row.status, row.value) == ("fail", pytest.approx(10 / 7))

@@ -29,7 +29,8 @@ def surroundings(case: Case, stage: StageCase) -> Surroundings:
     spec = case.spec
     following = next(iter(case.stages[stage.index + 1 : stage.index + 2]), None)
     choice, (near, far) = stage.choice, stage.distances
-    asked = (one.limit for one in spec.requirements if one.kind == "sample_spacing")
+    wanted = (one for one in spec.requirements if one.kind == "sample_spacing")
+    asked = (float(limit) for one in wanted if (limit := case.choice_limit(one)) is not None)
     return Surroundings(
         choice.name,
         near,

@@ -142,6 +142,8 @@ def _in_turn(
             if least is None:
                 return None
             value = max(asked, with_room(search.requirement(limit).kind, least))
+            if not search.exists({**others, limit: value}):
+                return None
         out[limit] = (value / asked if asked else Fraction(10**18), value)
     return out
 
@@ -149,7 +151,8 @@ def _in_turn(
 def _least(search: _Search, limit: WaivedLimit, others: Values) -> Fraction | None:
     """The least of a limit that some payload keeps, where none keeps it as it is asked for."""
     kind = search.requirement(limit).kind
-    if kind == "sample_spacing" or kind in JUDGED_KINDS:
+    likely = search.work.likelihood is not None and kind not in RESOURCES  # no sum at given figures
+    if likely or kind == "sample_spacing" or kind in JUDGED_KINDS:
         return _by_halving(search, limit, others)
     return least_of(search.eased(others), FamilyLimit(limit.mission, ConflictPart(kind, limit.id)))
 
