@@ -469,6 +469,31 @@ def test_a_bias_that_slower_noise_could_leave_breaks_no_figure(
     assert ("slower than this log" in row.words) == (status == "not_shown")
 
 
+@pytest.mark.parametrize(
+    ("verdict", "low", "status"),
+    [
+        ("unexplained", 0.0, "not_shown"),
+        ("unexplained", 1.2, "broken"),
+        ("explained", 0.0, "broken"),
+    ],
+)
+def test_noise_in_the_shape_of_what_has_no_name_breaks_no_figure(
+    found: Diagnosis, verdict: str, low: float, status: str
+) -> None:
+    """Slow noise takes the shape of whatever is missing, unless the figure itself is exceeded."""
+    case = load(EXAMPLE)
+    on_paper = check_loaded(case, CheckSettings(monte_carlo=False))
+    slow = replace(found.findings[0], effect="correlated_noise", sensor="position", also=None,
+                   parameters={}, kind="noise", material=True, aliases=())  # fmt: skip
+    split = NoiseFactors((NoiseFactor(max(low, 0.5), low, 1.41),), (1.0,), (0.012, 0.012, 0.02))
+    one = next(a for a in assumptions(case, on_paper) if (a.role, a.name) == ("position", "noise"))
+    told = replace(found, findings=(slow,), verdict=verdict)
+    sight = Sighted(told, factors={f"{one.stage}/position": split})
+    row = by_log(one, LogEvidence(told, OnPaper(case, ()), one.stage, sight=sight))
+    assert row.status == status, row
+    assert ("has no name" in row.words) is (status == "not_shown")
+
+
 @pytest.mark.parametrize(("low", "status"), [(0.98, "broken"), (0.8, "not_shown")])
 @pytest.mark.parametrize("alias", [True, False])
 def test_a_turn_that_slower_noise_could_leave_breaks_no_mounting(

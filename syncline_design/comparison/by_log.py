@@ -62,7 +62,7 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
         return unsure
     standing = log.parts.standing(one)
     suspect = _suspect(one, log)
-    breaking = [f for f in breaking if log.is_sure(one, f)]
+    breaking = [f for f in breaking if log.is_sure(one, f) and not _is_shape(one, f, log)]
     if breaking or (standing is not None and standing.status == "broken"):
         said = _broken(one, breaking, standing, _noise_figure(one, log), _readings(log.split(one)))
         undone = list(log.parts.undone(one, _width(said.measured)))
@@ -204,6 +204,15 @@ def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) ->
     words = (f"noise beyond the spec's, of {one.role} or {' or '.join(others)}: this log cannot "
              f"tell whose ({_said(breaking[0])})")  # fmt: skip
     return Judgement("not_shown", words, figure)
+
+
+def _is_shape(one: Assumed, finding: Finding, log: LogEvidence) -> bool:
+    """Whether noise may be the shape of what has no name: a slow one takes that of whatever is
+    missing.  It is none where the sensor's figure is shown to be beyond the spec's."""
+    if finding.kind != "noise" or log.found.verdict != "unexplained":
+        return False
+    figure = _noise_figure(one, log)
+    return figure is None or figure.low is None or figure.low <= 1.0
 
 
 def _said(finding: Finding) -> str:
