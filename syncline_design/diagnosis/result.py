@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
+
+from typing_extensions import TypeAliasType
 
 from syncline_design.diagnosis.plotted import Plots
 from syncline_design.effects import registry
@@ -15,6 +17,7 @@ from syncline_design.spec.effects_listed import EffectChoice
 
 SCHEMA: Final = "syncline-design/diagnosis/v1"
 LogOutcome = Literal["agrees", "explained", "unexplained"]
+Told = TypeAliasType("Told", "bool | float | str | list[Told] | dict[str, Told] | None")  # as JSON
 Kind = Literal["cause", "noise", "stand_in"]
 Severity = Literal["contradiction", "caution"]
 Scope = Literal["build", "start", "log"]
@@ -529,7 +532,7 @@ class Diagnosis(Record):
     smallest_seen: tuple[Smallest, ...] = ()
     plan: NextDrive | None = optional()
     joint: Joint | None = optional()
-    system: Mapping[str, Any] | None = optional()
+    system: Mapping[str, Told] | None = optional()
 
     @property
     def exit_code(self) -> int:
