@@ -20,9 +20,11 @@ from syncline_design.campaign.kept import Run
 from syncline_design.campaign.naming import Naming
 from syncline_design.campaign.pool import Pool, Scoped, fitted, pool_of
 from syncline_design.campaign.store import read_store
+from syncline_design.campaign.telling import on_average
 from syncline_design.cli.app import app
 from syncline_design.diagnosis import DiagnosisSettings
 from syncline_design.diagnosis.noise import row_covariance
+from syncline_design.diagnosis.result import Estimate
 from syncline_design.diagnosis.run import examined
 from syncline_design.diagnosis.sufficient import Less, Sufficient, shown_level, sufficient
 from syncline_design.diagnosis.system import measured
@@ -122,6 +124,19 @@ def test_parameters_are_called_by_their_own_names() -> None:
     for term in pool.terms:
         names = [pool.labels[k][3] for k in term.index]
         assert names == [p.name for p in term.effect.slopes()]
+
+
+def test_what_differs_is_told_by_its_mean_as_uncertain_as_it_scatters() -> None:
+    """87 and 0.12 ms: 43.56, s / sqrt(2) = 43.44, Student's 12.706 of that at one degree."""
+    one = Sufficient((("latency", "position", 0, "latency_s"),), np.eye(1), np.zeros(1), 0.0,
+                     np.eye(1), ())  # fmt: skip
+    (latency,) = pool_of([one], [1]).terms
+    once = {"latency_s": Estimate(0.0547, 0.0027, "s", True, "")}
+    found = on_average(latency, np.array([[0.087], [0.00012]]), once)["latency_s"]
+    assert float(found.value) == pytest.approx(0.04356)
+    assert found.standard_uncertainty == pytest.approx(0.04344)
+    assert found.interval95 == pytest.approx((0.04356 - 0.55195, 0.04356 + 0.55195), abs=1e-5)
+    assert on_average(latency, np.array([[0.087]]), once) == once
 
 
 def test_the_order_of_logs_changes_nothing() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import t as student
 
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
@@ -120,6 +121,8 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
     stage = told.stages[term.stage]
     k = [s.term.label for s in told.named.fit.scoped].index(term.label)
     shown = _estimates(term, one.judged)
+    if one.scoped.scope != "build":
+        shown = on_average(term, told.named.fit.of(k), shown)
     size_m = _size_m(told, k)
     values = tuple((name, e.value) for name, e in shown.items())
     material = weights.material(size_m, EffectEntry(effect.name, term.sensor, stage, values))
@@ -162,6 +165,28 @@ def _estimates(term: Term, judged: Judged) -> dict[str, Estimate]:
         interval = (value - half, value + half) if seen[k] else None
         shown = spread if seen[k] else math.inf
         found[p.name] = estimate(value, shown, p.unit, bool(seen[k]), interval)
+    return found
+
+
+def on_average(term: Term, values: Array, once: dict[str, Estimate]) -> dict[str, Estimate]:
+    """The mean of values (groups, p) that differ, as uncertain as they scatter.
+
+    s / sqrt(n), with Student's interval of n - 1: the logs are what is drawn, not their rows.
+    once: as if it were one value, which says what is seen.
+    """
+    count = len(values)
+    if count < 2:
+        return once
+    slopes = [p.name for p in term.effect.slopes()]
+    means, spreads = values.mean(axis=0), values.std(axis=0, ddof=1) / math.sqrt(count)
+    half = float(student.ppf(0.975, count - 1)) * spreads
+    found = {}
+    for name, each in once.items():
+        k = slopes.index(name)
+        value = float(means[k])
+        ends = (value - float(half[k]), value + float(half[k])) if each.seen else None
+        spread = float(spreads[k]) if each.seen else math.inf
+        found[name] = estimate(value, spread, each.unit, each.seen, ends)
     return found
 
 

@@ -18,6 +18,7 @@ from syncline_design.spec.effects_listed import EffectChoice
 SCHEMA: Final = "syncline-design/diagnosis/v1"
 LogOutcome = Literal["agrees", "explained", "unexplained"]
 Told = TypeAliasType("Told", "bool | float | str | list[Told] | dict[str, Told] | None")  # as JSON
+RULED_OUT: Final = 0.01  # probability of an alias that is not held open
 Kind = Literal["cause", "noise", "stand_in"]
 Severity = Literal["contradiction", "caution"]
 Scope = Literal["build", "start", "log"]
@@ -164,6 +165,11 @@ class Finding(Record):
     one_value: float | None = optional()
     each_log: tuple[PerLog, ...] | None = optional()
     readings: Mapping[str, float] | None = optional()
+
+    @property
+    def open_aliases(self) -> tuple[Rival, ...]:
+        """The aliases that are not as good as ruled out."""
+        return tuple(a for a in self.aliases if a.probability is None or a.probability >= RULED_OUT)
 
     @property
     def fits_a_spec(self) -> bool:

@@ -26,7 +26,7 @@ def asked_of(system: System, found: Diagnosis) -> PlanWanted:
         EffectPair(_named(system, one), _named(system, rival), sizes_of(one))
         for one in found.findings
         if moves(one.effect)
-        for rival in one.aliases
+        for rival in one.open_aliases
         if moves(rival.effect)
     )
     if pairs:

@@ -158,7 +158,7 @@ def _classes(found: Diagnosis, several: bool) -> Iterator[AliasClass]:
     for one in found.findings:
         if one.kind == "noise" or not one.material or not moves(one.effect):
             continue
-        aliases = sorted(one.aliases, key=lambda r: registry()[r.effect].rarity)
+        aliases = sorted(one.open_aliases, key=lambda r: registry()[r.effect].rarity)
         rivals = tuple(_named(r, several) for r in aliases if moves(r.effect))
         if rivals:
             yield AliasClass(_named(one, several), sizes_of(one), rivals)

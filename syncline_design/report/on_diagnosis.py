@@ -68,7 +68,6 @@ DIAGNOSES: Final[dict[str, Outcome]] = {
 _UNSOUND: Final = Outcome(
     "bad", "!", "Unexplained: the log contradicts itself or the limits of the spec's platform"
 )
-RULED_OUT: Final = 0.01  # probability of an alias that is not held open
 LARGE: Final = 1.25  # times the RMS that the spec's noise expects: said in the outcome
 NOWHERE: Final = "in no regime on average: it shows in how the errors vary, not in their mean"
 MOST_REGIMES: Final = 4  # told outside the page
@@ -322,8 +321,8 @@ def finding_node(found: Finding, drive: NextDrive | None = None) -> Node:
     ]
     if found.varying:
         nodes.append(Text(_varying_text(found, found.varying), mark="!"))
-    unlikely = [a for a in found.aliases if a.probability is not None and a.probability < RULED_OUT]
-    open_ = [a for a in found.aliases if a not in unlikely]
+    open_ = found.open_aliases
+    unlikely = [a for a in found.aliases if a not in open_]
     if open_:
         names = sentence_list([_alias_text(one) for one in open_])
         apart = _apart(found, open_, drive)
