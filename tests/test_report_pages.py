@@ -238,7 +238,7 @@ def test_a_finding_reads_the_same_on_console_page_markdown_and_json(
     value: float, uncertainty: float | None, unit: str
 ) -> None:
     """One estimate through all four outputs; mpmath undoes the unit and finds the value again."""
-    effect = replace(registry()["latency"], sentence="it is {latency_s}")
+    effect = replace(registry()["latency"], sentence="it is {latency_s}", reverse="")
     figures = {"latency_s": estimate(value, uncertainty, unit)}
     found = finding(effect, "position", "uav", figures, "clear", 1.0, -5.0)
     printed = found.sentence.removeprefix("It is ")

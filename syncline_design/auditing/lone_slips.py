@@ -47,6 +47,7 @@ def without_lone_slips(series: Series) -> Repaired:
     if not 0 < int(off.sum()) <= _MOST * places.size:
         return Repaired(series)
     off &= _fills_its_place(series.stamp[places], turns, off)
+    off &= _returns(off)
     others = _lone((turns == 0.0) & (np.abs(away) > _STRAY_S))
     if int(off.sum()) <= _CHANCE * int(others.sum()):
         return Repaired(series)  # of stamps that are wrong by any amount some are off by seconds
@@ -100,6 +101,14 @@ def _fills_its_place(stamp: NDArray[np.int64], turns: Array, off: Mask) -> Mask:
     placed = np.concatenate([[True], fits]) & np.concatenate([fits, [True]])
     stale = np.concatenate([[False], np.diff(stamp) == 0]) & (turns > 0.0)
     return np.asarray(placed & ~stale)
+
+
+def _returns(off: Mask) -> Mask:
+    """Those with stamps as usual before and after: at an end they may be a counter begun anew."""
+    usual = np.flatnonzero(~off)
+    out = np.zeros(off.size, bool)
+    out[usual[0] : usual[-1]] = True
+    return out
 
 
 def _fault(series: Series, places: NDArray[np.intp], turn: float) -> StampFault:
