@@ -15,7 +15,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from syncline_design.cli import completions
 from syncline_design.cli.app import EXAMPLES, app
+from syncline_design.effects import registry
+from syncline_design.spec.catalog import SECTIONS
+from syncline_design.spec.load import builtin_collection
 
 SCRIPT = """\
 eval "$(_SYNCLINE_DESIGN_COMPLETE=source_bash syncline-design)"
@@ -38,6 +42,8 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
         ("catalog add --from-template lid", {"lidar", "lidar_2d"}),
         ("optimize specs/x.yaml --road mi", {"milp"}),
         ("check specs/x.yaml -o ju", {"junit:"}),
+        ("optimize specs/x.yaml --why-not velodyne_h", {"velodyne_hdl32e"}),
+        ("plan specs/x.yaml --reach laten", {"latency("}),
     ],
 )
 def test_bash_completes(tmp_path: Path, words: str, wanted: set[str]) -> None:
@@ -51,6 +57,29 @@ def test_bash_completes(tmp_path: Path, words: str, wanted: set[str]) -> None:
                           timeout=120, check=True)  # fmt: skip
     assert set(done.stdout.split()) == wanted
     assert done.stderr == ""
+
+
+def test_names_are_those_of_catalogs_and_effects() -> None:
+    """What is quick to list is what there is."""
+    catalog = builtin_collection().catalog()
+    every = {name for section in SECTIONS for name in getattr(catalog, section)}
+    assert set(completions.catalog_ids()) == every
+    assert set(completions.catalog_sections()) == set(SECTIONS)
+    assert completions.effect_names() == sorted(registry())
+
+
+def test_the_effects_of_a_plan_go_on_term_by_term() -> None:
+    typed = "latency(position)=1 ms, lever_arm(att"
+    assert completions.effect_terms(typed) == ["latency(position)=1 ms, lever_arm(attitude)="]
+    assert "latency(position)=1 ms, lever_arm(" in completions.effect_terms(typed[:-5])
+
+
+def test_names_are_offered_without_loading_what_computes() -> None:
+    """An answer to Tab: numpy, catalogs and effects took three times as long as all the rest."""
+    asked = "import sys; from syncline_design.cli.completions import catalog_ids, effect_terms; "
+    asked += "catalog_ids(); effect_terms(''); print('numpy' in sys.modules, 'yaml' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

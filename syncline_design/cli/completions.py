@@ -7,11 +7,16 @@ loaded when it is asked for.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from importlib.resources import files
+from pathlib import Path
+
+from syncline_design.model.roles import ROLES
 
 Offer = Callable[[str], list[str]]
 
 SOLVER_ROADS = ("auto", "front", "milp", "enumerate")
 MEDIA = ("air", "water")
+SENSORS = (*ROLES, "target")  # what an effect acts on
 
 
 def among(words: Callable[[], Iterable[str]]) -> Offer:
@@ -34,19 +39,39 @@ def format_words(formats: tuple[str, ...]) -> Offer:
 
 
 def catalog_ids() -> list[str]:
-    """Every entry of the built-in catalogs."""
-    from syncline_design.report.catalogs import SECTIONS
-    from syncline_design.spec.load import builtin_collection
-
-    catalog = builtin_collection().catalog()
-    return [name for section in SECTIONS for name in getattr(catalog, section)]
+    """Every entry of the built-in catalogs, from the list of their names alone: no file is read."""
+    return list(dict.fromkeys(name for _, name in _published()))
 
 
-def catalog_sections() -> tuple[str, ...]:
+def catalog_sections() -> list[str]:
     """Kinds of entries that a catalog has."""
-    from syncline_design.report.catalogs import SECTIONS
+    return list(dict.fromkeys(section for section, _ in _published()))
 
-    return tuple(SECTIONS)
+
+def _published() -> list[tuple[str, str]]:
+    """Section and id of all shipped entries."""
+    lines = (files("syncline_design.catalogs") / "ids.txt").read_text("utf-8").split("\n")
+    return [(section, name) for section, _, name in (line.partition(" ") for line in lines) if name]
+
+
+def effect_terms(incomplete: str) -> list[str]:
+    """`latency(` of a sum such as `latency(position)=1 ms, lev`, then `latency(position)=`.
+
+    Names are those of the files in which effects are found; loading them takes a second.
+    """
+    head, comma, last = incomplete.rpartition(",")
+    lead = head + comma + last[: len(last) - len(last.lstrip())]
+    name, bracket, sensor = last.strip().partition("(")
+    if not bracket:
+        return [f"{lead}{one}(" for one in effect_names() if one.startswith(name)]
+    return [f"{lead}{name}({one})=" for one in SENSORS if one.startswith(sensor)]
+
+
+def effect_names() -> list[str]:
+    """Every effect by its name, sorted."""
+    folder = Path(__file__).parent.parent / "effects"
+    modules = sorted(folder.glob("*.py"))
+    return [one.stem for one in modules if "\nEFFECT" in one.read_text("utf-8")]
 
 
 def stub_types() -> tuple[str, ...]:

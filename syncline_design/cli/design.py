@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from syncline_design.cli.completions import among, catalog_ids
 from syncline_design.cli.shared import (
     CheckOutput,
     DiffOutput,
@@ -165,7 +166,11 @@ def optimize(
     ] = None,
     why_not: Annotated[
         list[str] | None,
-        typer.Option(metavar="ENTRY", help="Say why a catalog entry is not in it. Repeatable."),
+        typer.Option(
+            metavar="ENTRY",
+            help="Say why a catalog entry is not in it. Repeatable.",
+            autocompletion=among(catalog_ids),
+        ),
     ] = None,
     write_design: Annotated[
         Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")

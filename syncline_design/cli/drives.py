@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from syncline_design.cli.completions import effect_terms
 from syncline_design.cli.shared import (
     PlanOutput,
     QuietOption,
@@ -51,6 +52,7 @@ def plan(
         str | None,
         typer.Option(
             metavar="TEXT",
+            autocompletion=effect_terms,
             help='Standard uncertainties: "latency(position)=1 ms, lever_arm(position)=1 cm".',
         ),
     ] = None,
