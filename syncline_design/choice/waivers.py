@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from fractions import Fraction
-from typing import Final
+from typing import Final, TypeVar
 
+from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import NoVerdict, OutOfTime
 from syncline_design.choice.parts import SIMULATED, ConflictPart, is_feasible, least
 from syncline_design.choice.variations import Build
@@ -16,10 +17,12 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import JUDGED_KINDS, Requirement
 
 Eased = Mapping[str, Fraction | None]  # by id: the least limit that a design keeps; None: lifted
-EXACT: Final = ("cost", "mass", "power")  # sums; of other kinds a float is compared
 ROOM: Final = Fraction(1, 10**12)  # for a figure that was rounded to a float on its way
 WIDENED: Final = (0, Fraction(1, 100), Fraction(5, 100))  # a simulated figure, found by samples
 MOST_ORDERED: Final = 3  # requirements that are missed together and tried in every order
+ENDLESS: Final = Fraction(10**18)  # the share by which a limit of nothing is missed
+
+ValuesT = TypeVar("ValuesT")
 
 
 def waived(case: Case, day: date) -> tuple[str, ...]:
@@ -44,16 +47,30 @@ def eased(case: Case, build: Build, ids: Sequence[str]) -> Case | None:
     """
     if not _exists(case, build, dict.fromkeys(ids)):
         return None
+
+    def missed(together: tuple[str, ...]) -> Iterator[tuple[Fraction, dict[str, Fraction]]]:
+        if _exists(case, build, dict.fromkeys(together)):
+            for values in _least(case, build, together):
+                yield _largest(case, values), values
+
+    found = fewest(ids, missed)
+    if found is None:  # nothing tells by how little they can be missed
+        return lifted(case, ids)
+    return replace(case, eased=found)
+
+
+def fewest(
+    ids: Sequence[str], missed: Callable[[tuple[str, ...]], Iterable[tuple[Fraction, ValuesT]]]
+) -> ValuesT | None:
+    """The values of as few requirements as can be, of these with the least of the largest misses.
+
+    missed: the ways to miss a set of them alone, each with its largest miss, a share of the limit.
+    """
     for size in range(1, len(ids) + 1):
-        found = [
-            (_largest(case, values), values)
-            for together in itertools.combinations(ids, size)
-            if _exists(case, build, dict.fromkeys(together))
-            for values in _least(case, build, together)
-        ]
+        found = [way for together in itertools.combinations(ids, size) for way in missed(together)]
         if found:
-            return replace(case, eased=min(found, key=lambda one: one[0])[1])
-    return lifted(case, ids)  # nothing tells by how little they can be missed
+            return min(found, key=lambda way: way[0])[1]
+    return None
 
 
 def orders(together: Sequence[str]) -> Iterator[tuple[str, ...]]:
@@ -66,7 +83,7 @@ def orders(together: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 def with_room(kind: str, value: Fraction) -> Fraction:
     """A least value as a limit that the design it comes from keeps."""
-    return value if kind in EXACT else value * (1 + ROOM)
+    return value if kind in RESOURCES else value * (1 + ROOM)  # of sums: they are exact
 
 
 def _exists(case: Case, build: Build, values: Eased) -> bool:
@@ -117,4 +134,4 @@ def _largest(case: Case, values: Mapping[str, Fraction]) -> Fraction:
     """The largest miss of a set, value over limit; what misses a limit of nothing comes last."""
     limits = {one.id: case.limit(one) for one in case.spec.requirements}
     shares = [value / limits[name] for name, value in values.items() if limits[name]]
-    return max(shares) if len(shares) == len(values) else Fraction(10**18)
+    return max(shares) if len(shares) == len(values) else ENDLESS

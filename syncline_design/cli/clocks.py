@@ -33,49 +33,61 @@ if TYPE_CHECKING:
     from syncline_design.spec.case import Case
 
 _SHARE = "a share between 0 and 1, such as 0.95"
+LogsArgument = Annotated[
+    list[Path],
+    typer.Argument(help="Logs of one clock: chrony, ntpd, linuxptp, gpsd, ppstest, CSV; .gz."),
+]
+AsOption = Annotated[
+    str | None,
+    typer.Option("--as", metavar="ID", help="Write a catalog entry of this id."),
+]
+EntryOption = Annotated[Literal["clock", "timestamping"], typer.Option(help="What --as writes.")]
+WriteCatalogOption = Annotated[
+    Path | None, typer.Option(metavar="PATH", help="Where --as writes; default: ID.yaml.")
+]
+SessionOption = Annotated[
+    str, typer.Option(metavar="GAP", help="A longer gap begins a new session.")
+]
+CoverageOption = Annotated[float, typer.Option(help="Share of a session's time.")]
+SessionShareOption = Annotated[float, typer.Option(help="Share of future sessions.")]
+ConfidenceOption = Annotated[float, typer.Option(help="Confidence of the claim.")]
+SpecOption = Annotated[
+    Path | None, typer.Option(metavar="SPEC", help="Say what it means for this spec.")
+]
+SourceOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Which source of the logs to use.")
+]
+IndependentOption = Annotated[
+    bool, typer.Option("--independent", help="These offsets do not steer the clock.")
+]
+DeclareOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME=TIME", help="Add what no log shows: path_asymmetry=5us."),
+]
+UseOption = Annotated[
+    Literal["larger", "statistical", "hard"], typer.Option(help="Which bound to take.")
+]
+ConditionsOption = Annotated[
+    str | None, typer.Option(metavar="TEXT", help="Under which conditions it was measured.")
+]
 
 
 @guarded
 def timing(
-    log: Annotated[
-        list[Path],
-        typer.Argument(help="Logs of one clock: chrony, ntpd, linuxptp, gpsd, ppstest, CSV; .gz."),
-    ],
-    as_id: Annotated[
-        str | None,
-        typer.Option("--as", metavar="ID", help="Write a catalog entry of this id."),
-    ] = None,
-    entry: Annotated[
-        Literal["clock", "timestamping"], typer.Option(help="What --as writes.")
-    ] = "clock",
-    write_catalog: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Where --as writes; default: ID.yaml.")
-    ] = None,
-    session: Annotated[
-        str, typer.Option(metavar="GAP", help="A longer gap begins a new session.")
-    ] = "1 h",
-    coverage: Annotated[float, typer.Option(help="Share of a session's time.")] = 0.95,
-    session_share: Annotated[float, typer.Option(help="Share of future sessions.")] = 0.95,
-    confidence: Annotated[float, typer.Option(help="Confidence of the claim.")] = 0.95,
-    spec: Annotated[
-        Path | None, typer.Option(metavar="SPEC", help="Say what it means for this spec.")
-    ] = None,
-    source: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which source of the logs to use.")
-    ] = None,
-    independent: Annotated[
-        bool, typer.Option("--independent", help="These offsets do not steer the clock.")
-    ] = False,
-    declare: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=TIME", help="Add what no log shows: path_asymmetry=5us."),
-    ] = None,
-    use: Annotated[
-        Literal["larger", "statistical", "hard"], typer.Option(help="Which bound to take.")
-    ] = "larger",
-    conditions: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="Under which conditions it was measured.")
-    ] = None,
+    log: LogsArgument,
+    as_id: AsOption = None,
+    entry: EntryOption = "clock",
+    write_catalog: WriteCatalogOption = None,
+    session: SessionOption = "1 h",
+    coverage: CoverageOption = 0.95,
+    session_share: SessionShareOption = 0.95,
+    confidence: ConfidenceOption = 0.95,
+    spec: SpecOption = None,
+    source: SourceOption = None,
+    independent: IndependentOption = False,
+    declare: DeclareOption = None,
+    use: UseOption = "larger",
+    conditions: ConditionsOption = None,
     output: TimingOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,

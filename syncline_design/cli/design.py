@@ -35,8 +35,50 @@ from syncline_design.report.formats import NEXT_TO_TEXT, PICTURED
 
 if TYPE_CHECKING:
     from syncline_design.report.document import Document
+    from syncline_design.report.write import OutputTarget
     from syncline_design.verdict.optimization import Optimized
-    from syncline_design.verdict.tree import Checked, Verdict
+    from syncline_design.verdict.tree import Checked, Refused, Verdict
+
+Amount = Literal["cost", "mass", "power"]
+Figure = Literal["worst_case", "thu", "tvu", "rmse", "quantile"]
+ExplainOption = Annotated[
+    list[str] | None,
+    typer.Option("--explain", metavar="ID", help="Work a requirement out step by step."),
+]
+BaselineOption = Annotated[
+    Path | None,
+    typer.Option(metavar="PATH", help="An earlier JSON: only what got worse since then fails."),
+]
+SkipOthersOption = Annotated[
+    bool, typer.Option("--skip-others", help="Pass over named files that are no specs too.")
+]
+BestOption = Annotated[int, typer.Option(min=1, help="How many designs that differ in a sensor.")]
+EveryOption = Annotated[
+    bool, typer.Option("--every", help="Of --best: rank every design, whatever differs.")
+]
+ParetoOption = Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")]
+ResourceOption = Annotated[
+    Amount, typer.Option("--resource", help="What the front sets against error.")
+]
+AgainstOption = Annotated[
+    Literal[Amount, Figure] | None,
+    typer.Option(
+        "--against",
+        help="Draw the front over this: an amount against error, or cost (or --resource) "
+        "against this figure of the error.",
+    ),
+]
+WhyNotOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="ENTRY",
+        help="Say why a catalog entry is not in it. Repeatable.",
+        autocompletion=among(catalog_ids),
+    ),
+]
+WriteDesignOption = Annotated[
+    Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")
+]
 
 
 @guarded
@@ -47,29 +89,17 @@ def check(
     quiet: QuietOption = False,
     road: RoadOption = "auto",
     time_limit: TimeLimitOption = None,
-    skip_others: Annotated[
-        bool, typer.Option("--skip-others", help="Pass over named files that are no specs too.")
-    ] = False,
-    explain: Annotated[
-        list[str] | None,
-        typer.Option("--explain", metavar="ID", help="Work a requirement out step by step."),
-    ] = None,
-    baseline: Annotated[
-        Path | None,
-        typer.Option(metavar="PATH", help="An earlier JSON: only what got worse since then fails."),
-    ] = None,
+    skip_others: SkipOthersOption = False,
+    explain: ExplainOption = None,
+    baseline: BaselineOption = None,
 ) -> int:
     """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
     deadline = deadline_of(time_limit)
     from syncline_design.comparison.verdict_file import read_verdicts
-    from syncline_design.report.checks import CHECK_FORMATS, render_checks
-    from syncline_design.report.on_verdict import on_verdict
-    from syncline_design.report.render_console import console
-    from syncline_design.report.several import skipped_text, summary_line
-    from syncline_design.report.write import STDOUT, OutputError
+    from syncline_design.report.checks import CHECK_FORMATS
+    from syncline_design.report.several import skipped_text
     from syncline_design.spec.folders import spec_files
     from syncline_design.verdict.settings import CheckSettings
-    from syncline_design.verdict.tree import Refused
     from syncline_design.verdict.verify import check_files
 
     with watched(deadline, quiet=quiet):
@@ -85,17 +115,32 @@ def check(
     if earlier is not None:
         verdicts = [_since(one, earlier, str(baseline)) for one in verdicts]
     _demand_known(verdicts, settings.explain)
-    refused = [verdict for verdict in verdicts if isinstance(verdict, Refused)]
-    for verdict in refused:
+    for verdict in _refused(verdicts):
         say(verdict.text)
-    if refused:  # no file is written; what goes to standard output may say so
-        targets = [target for target in targets if target.path == STDOUT]
-    text = "\n".join(console(on_verdict(v)) for v in verdicts if not isinstance(v, Refused))
-    if len(found.files) != 1 or any(path.is_dir() for path in spec):
-        summary = summary_line(verdicts)
-        text = f"{text}\n{summary}\n" if text else f"{summary}\n"
     if found.skipped and not quiet:
         say(skipped_text(found.skipped))
+    several = len(found.files) != 1 or any(path.is_dir() for path in spec)
+    _emit_checks(verdicts, targets, several=several, quiet=quiet)
+    return max((verdict.exit_code for verdict in verdicts), default=0)
+
+
+def _refused(verdicts: Sequence[Checked]) -> list[Refused]:
+    from syncline_design.verdict.tree import Refused
+
+    return [verdict for verdict in verdicts if isinstance(verdict, Refused)]
+
+
+def _emit_checks(
+    verdicts: Sequence[Checked], targets: list[OutputTarget], *, several: bool, quiet: bool
+) -> None:
+    """The text and the files; where a spec was refused nothing but what goes to standard output."""
+    from syncline_design.report.checks import render_checks
+    from syncline_design.report.write import STDOUT, OutputError
+
+    refused = _refused(verdicts)
+    if refused:
+        targets = [target for target in targets if target.path == STDOUT]
+    text = _checks_text(verdicts, several=several)
     try:
         emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet,
              charts=lambda: _pictures(verdicts))  # fmt: skip
@@ -103,7 +148,20 @@ def check(
         if len(refused) < len(verdicts):
             raise
         say(f"syncline-design: {error}")  # nothing was computed: that the specs are bad stands
-    return max((verdict.exit_code for verdict in verdicts), default=0)
+
+
+def _checks_text(verdicts: Sequence[Checked], *, several: bool) -> str:
+    """Verdict after verdict; of several specs a summary at the end."""
+    from syncline_design.report.on_verdict import on_verdict
+    from syncline_design.report.render_console import console
+    from syncline_design.report.several import summary_line
+    from syncline_design.verdict.tree import Verdict
+
+    text = "\n".join(console(on_verdict(v)) for v in verdicts if isinstance(v, Verdict))
+    if not several:
+        return text
+    summary = summary_line(verdicts)
+    return f"{text}\n{summary}\n" if text else f"{summary}\n"
 
 
 def _since(verdict: Checked, earlier: Sequence[Verdict], file: str) -> Checked:
@@ -147,34 +205,13 @@ def optimize(
     quiet: QuietOption = False,
     road: RoadOption = "auto",
     time_limit: TimeLimitOption = None,
-    best: Annotated[int, typer.Option(min=1, help="How many designs that differ in a sensor.")] = 1,
-    every: Annotated[
-        bool, typer.Option("--every", help="Of --best: rank every design, whatever differs.")
-    ] = False,
-    pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
-    resource: Annotated[
-        Literal["cost", "mass", "power"],
-        typer.Option("--resource", help="What the front sets against error."),
-    ] = "cost",
-    against: Annotated[
-        Literal["cost", "mass", "power", "worst_case", "thu", "tvu", "rmse", "quantile"] | None,
-        typer.Option(
-            "--against",
-            help="Draw the front over this: an amount against error, or cost (or --resource) "
-            "against this figure of the error.",
-        ),
-    ] = None,
-    why_not: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="ENTRY",
-            help="Say why a catalog entry is not in it. Repeatable.",
-            autocompletion=among(catalog_ids),
-        ),
-    ] = None,
-    write_design: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")
-    ] = None,
+    best: BestOption = 1,
+    every: EveryOption = False,
+    pareto: ParetoOption = False,
+    resource: ResourceOption = "cost",
+    against: AgainstOption = None,
+    why_not: WhyNotOption = None,
+    write_design: WriteDesignOption = None,
 ) -> int:
     """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
     deadline = deadline_of(time_limit)
@@ -210,10 +247,6 @@ def optimize(
     emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet,
          charts=lambda: {"": on_optimized(found)})  # fmt: skip
     return found.result.exit_code
-
-
-Amount = Literal["cost", "mass", "power"]
-Figure = Literal["worst_case", "thu", "tvu", "rmse", "quantile"]
 
 
 def _axes(resource: Amount, against: Amount | Figure | None) -> tuple[Amount, Figure | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -34,9 +34,54 @@ if TYPE_CHECKING:
     from syncline_design.campaign.joint import JointRequest
     from syncline_design.comparison.meaning import DesignMeaning
     from syncline_design.comparison.repairs import Repair
-    from syncline_design.diagnosis import Diagnosis
+    from syncline_design.diagnosis import Diagnosis, DiagnosisSettings
     from syncline_design.machine.deadline import Deadline
     from syncline_design.spec.case import Case
+
+LogsArgument = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        help="Measured logs, of any kind that is read; default: the spec's `log: files:`."
+    ),
+]
+WriteSpecOption = Annotated[
+    Path | None, typer.Option(metavar="PATH", help="Write the spec with the findings in it.")
+]
+FalseAlarmOption = Annotated[
+    float,
+    typer.Option(
+        min=FALSE_ALARM_RATES[0],
+        max=FALSE_ALARM_RATES[1],
+        help="Chance that a clean log is found at fault.",
+    ),
+]
+MaxEffectsOption = Annotated[
+    int, typer.Option(min=0, max=MOST_EFFECTS, help="Effects named at most.")
+]
+InformativeOption = Annotated[
+    bool,
+    typer.Option(
+        "--require-informative",
+        help="Exit with 3 where the log agrees but could not have shown what would turn it.",
+    ),
+]
+JointOption = Annotated[
+    bool, typer.Option("--joint", help="Each LOG is a run of the same system; take them together.")
+]
+StartsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="1,1,2",
+        help="With --joint: the start of the system that each log is of; default: its own.",
+    ),
+]
+StoreOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="PATH",
+        help="With --joint: keep what each log says in this file, with what it holds.",
+    ),
+]
 
 
 @guarded
@@ -76,61 +121,23 @@ def simulate(
 @guarded
 def diagnose(
     spec: SpecArgument,
-    log: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            help="Measured logs, of any kind that is read; default: the spec's `log: files:`."
-        ),
-    ] = None,
+    log: LogsArgument = None,
     output: DiagnoseOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
-    write_spec: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Write the spec with the findings in it.")
-    ] = None,
-    false_alarm_rate: Annotated[
-        float,
-        typer.Option(
-            min=FALSE_ALARM_RATES[0],
-            max=FALSE_ALARM_RATES[1],
-            help="Chance that a clean log is found at fault.",
-        ),
-    ] = 0.05,
-    max_effects: Annotated[
-        int, typer.Option(min=0, max=MOST_EFFECTS, help="Effects named at most.")
-    ] = 8,
-    require_informative: Annotated[
-        bool,
-        typer.Option(
-            "--require-informative",
-            help="Exit with 3 where the log agrees but could not have shown what would turn it.",
-        ),
-    ] = False,
-    joint: Annotated[
-        bool,
-        typer.Option("--joint", help="Each LOG is a run of the same system; take them together."),
-    ] = False,
-    starts: Annotated[
-        str | None,
-        typer.Option(
-            metavar="1,1,2",
-            help="With --joint: the start of the system that each log is of; default: its own.",
-        ),
-    ] = None,
-    store: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="PATH",
-            help="With --joint: keep what each log says in this file, with what it holds.",
-        ),
-    ] = None,
+    write_spec: WriteSpecOption = None,
+    false_alarm_rate: FalseAlarmOption = 0.05,
+    max_effects: MaxEffectsOption = 8,
+    require_informative: InformativeOption = False,
+    joint: JointOption = False,
+    starts: StartsOption = None,
+    store: StoreOption = None,
     time_limit: TimeLimitOption = None,
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
     deadline = deadline_of(time_limit)
     from syncline_design.comparison.meaning import with_design
     from syncline_design.diagnosis import DiagnosisSettings
-    from syncline_design.diagnosis import diagnose as diagnose_log
     from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
     from syncline_design.report.on_diagnosis import on_diagnosis
     from syncline_design.report.render_console import console
@@ -146,12 +153,7 @@ def diagnose(
     with watched(deadline, targets, quiet=quiet, steps=False), _progress(quiet) as progress:
         case = load(spec)
         pinned = as_measured(case, seed)
-        if together is None:
-            found = diagnose_log(pinned, log or (), settings, progress)
-        else:
-            from syncline_design.campaign.joint import diagnose_joint
-
-            found = diagnose_joint(pinned, together, settings, progress)
+        found = _found(pinned, log or (), together, settings, progress)
         means = _meaning(case, found, seed, deadline)
         put_right = _repairs(pinned, found, seed, deadline)
         found = _with_drive(pinned, found)
@@ -179,6 +181,23 @@ def _joint(
     files = tuple(logs or ())
     named = None if starts is None else starts_of(starts, len(files))
     return JointRequest(files, named, store)
+
+
+def _found(
+    case: Case,
+    logs: Sequence[Path],
+    together: JointRequest | None,
+    settings: DiagnosisSettings,
+    progress: Callable[[str, float], None],
+) -> Diagnosis:
+    """The diagnosis of logs that are parts of one run, or each a run of its own."""
+    if together is None:
+        from syncline_design.diagnosis import diagnose as diagnose_log
+
+        return diagnose_log(case, logs, settings, progress)
+    from syncline_design.campaign.joint import diagnose_joint
+
+    return diagnose_joint(case, together, settings, progress)
 
 
 def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> DesignMeaning | None:

@@ -30,9 +30,7 @@ _DAY_S: Final = 86400.0  # zones are less apart
 _BIN: Final = 8  # rows of the sparser log: their mean hardly depends on where they were taken
 _FEWEST_BINS: Final = 20
 _BINS_ALIKE: Final = 0.9  # correlation of second differences of such means, free of a common day
-_BETWEEN: Final = (
-    0.97  # correlation of second differences of rows, read between the other log's rows
-)
+_BETWEEN: Final = 0.97  # correlation of second differences of rows, read between the other's
 _FEWEST_BETWEEN: Final = 30
 _STARTS: Final = (0.0, 0.35, 0.7)  # shares of a log at which such rows begin
 
@@ -190,7 +188,7 @@ def _averages_alike(logs: tuple[Rows, Rows], bin_s: float) -> bool:
     return _correlation(own, others) > _BINS_ALIKE
 
 
-def _bends(log: tuple[Array, Array], edges: Array) -> Array:
+def _bends(log: Rows, edges: Array) -> Array:
     """Second differences of the means between edges, brought to the middles: without a drift."""
     rows, _ = np.histogram(log[0], edges)
     full = rows > 0

@@ -10,16 +10,9 @@ from typing import Final
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_motion import CODES, by_motion
-from syncline_design.comparison.by_shift import (
-    by_shifts,
-    shifts,
-    widened,
-)
+from syncline_design.comparison.by_shift import by_shifts, shifts, widened
 from syncline_design.comparison.by_stretch import SPOKEN_OF
-from syncline_design.comparison.departing import (
-    amount,
-    figure_of,
-)
+from syncline_design.comparison.departing import amount, figure_of
 from syncline_design.comparison.in_doubt import (
     InDoubt,
     Suspicion,
@@ -31,10 +24,7 @@ from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.noise_split import NoiseFactors
-from syncline_design.diagnosis.result import (
-    Finding,
-    Smallest,
-)
+from syncline_design.diagnosis.result import Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.sentences import or_rivals
 from syncline_design.model.figure_text import format_duration, rounded, to_digits

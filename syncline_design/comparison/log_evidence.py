@@ -12,10 +12,7 @@ from scipy.stats import chi2
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
-from syncline_design.comparison.by_shift import (
-    delay_made,
-    delay_turns,
-)
+from syncline_design.comparison.by_shift import delay_made, delay_turns
 from syncline_design.comparison.by_stretch import InStretches
 from syncline_design.comparison.departing import (
     Departing,
@@ -25,18 +22,12 @@ from syncline_design.comparison.departing import (
     of_others,
     of_rival,
 )
-from syncline_design.comparison.in_doubt import (
-    InDoubt,
-    OneWay,
-)
+from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.comparison.late_together import others_late
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.noise_split import NoiseFactors
-from syncline_design.diagnosis.result import (
-    Diagnosis,
-    Finding,
-)
+from syncline_design.diagnosis.result import Diagnosis, Finding
 from syncline_design.diagnosis.stretches import is_inside
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass

@@ -30,9 +30,7 @@ _WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "attitude": ("attitude", "imu", "ahrs", "ins", "mru", "heading", "orientation"),
     "ranging": ("ranging", "lidar", "points", "scan", "usbl", "mbes", "sonar", "radar", "cloud"),
 }
-
-
-_IS = ("is", "are")
+_IS: Final = ("is", "are")
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,10 +28,7 @@ def secure_streams() -> None:
             os.fstat(number)
         except OSError:
             with contextlib.suppress(OSError):
-                opened = os.open(os.devnull, os.O_RDWR)
-                if opened != number:  # pragma: no cover  (the lowest free number is taken)
-                    os.dup2(opened, number)
-                    os.close(opened)
+                os.open(os.devnull, os.O_RDWR)  # takes the lowest free number, which is this
     if sys.stdout is None:
         sys.stdout = cast(TextIO, _Closed())
     sys.stderr = cast(TextIO, _Forgiving(sys.stderr))

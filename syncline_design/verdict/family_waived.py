@@ -6,7 +6,6 @@ each mission, and is eased in those missions alone that cannot keep it.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
@@ -17,7 +16,7 @@ from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import NoVerdict, OutOfTime
 from syncline_design.choice.parts import ConflictPart
 from syncline_design.choice.variations import Build
-from syncline_design.choice.waivers import orders, waived, with_room
+from syncline_design.choice.waivers import ENDLESS, fewest, orders, waived, with_room
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.requirement import JUDGED_KINDS, Requirement
@@ -101,17 +100,18 @@ def eased_family(work: Work, build: Callable[[], Build], ids: Sequence[str]) -> 
     search = _Search(work, build)
     if not search.exists(dict.fromkeys(_limits(work, ids))):
         return None
-    for size in range(1, len(ids) + 1):
-        found = [
-            (max(share for share, _ in values.values()), {k: v for k, (_, v) in values.items()})
-            for together in itertools.combinations(ids, size)
-            if search.exists(dict.fromkeys(_limits(work, together)))
-            for order in orders(together)
-            if (values := _in_turn(search, _limits(work, order)))
-        ]
-        if found:
-            return search.eased(min(found, key=lambda one: one[0])[1])
-    return lifted_family(work, build, ids)  # nothing tells by how little they can be missed
+
+    def missed(together: tuple[str, ...]) -> Iterator[tuple[Fraction, Values]]:
+        if search.exists(dict.fromkeys(_limits(work, together))):
+            for order in orders(together):
+                if values := _in_turn(search, _limits(work, order)):
+                    most = max(share for share, _ in values.values())
+                    yield most, {limit: value for limit, (_, value) in values.items()}
+
+    found = fewest(ids, missed)
+    if found is None:  # nothing tells by how little they can be missed
+        return lifted_family(work, build, ids)
+    return search.eased(found)
 
 
 def _limits(work: Work, ids: Sequence[str]) -> list[WaivedLimit]:
@@ -144,7 +144,7 @@ def _in_turn(
             value = max(asked, with_room(search.requirement(limit).kind, least))
             if not search.exists({**others, limit: value}):
                 return None
-        out[limit] = (value / asked if asked else Fraction(10**18), value)
+        out[limit] = (value / asked if asked else ENDLESS, value)
     return out
 
 
