@@ -2,147 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import math
 import os
 from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
 
 import syncline_design as sd
-from syncline_design.cli.app import app
 from syncline_design.clocks.study import TimingSettings, study_logs
-from syncline_design.clocks.tolerance import (
-    normal_factor,
-    sessions_of_order_statistic,
-    tolerance_bound,
-)
 from syncline_design.machine.records import read_as
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
-from syncline_design.verdict.verify import CheckSettings, check_loaded
 from tests import clock_logs as made
 from tests.clock_logs import START, sessions_csv, write
+from tests.clocked_specs import ROOT, SPEC, run, week_of_logs
 from tests.html_page import Page
-
-ROOT = Path(__file__).parent.parent
-SPEC = """\
-syncline: 1
-name: two timelines
-requirements:
-  - {id: ACC-1, kind: accuracy, limit: 0.30 m}
-  - {id: SYNC-1, kind: sync, limit: 1.0}
-catalogs: [own_clock.yaml]
-coverage_factor: 2
-stages:
-  - name: uav
-    platform: {v_max: 20 m/s, omega_max: 0.001 deg/s, distance: 0.1 m, baseline: 0 m}
-    clock: {candidates: [own_clock]}
-    position: {sensor: {modality: position, sigma_position: 1 cm, primitives: []},
-               timestamping: {error: {distribution: constant, value: 0 s}, timeline: utc}}
-    attitude: {sensor: {modality: attitude, sigma_attitude: 0.01 deg, primitives: []},
-               timestamping: {error: {distribution: constant, value: 0 s}}}
-    ranging: {sensor: {modality: ranging, sigma_range: 1 cm, sigma_bearing: 0.01 deg,
-              primitives: []}, timestamping: {error: {distribution: constant, value: 0 s}}}
-"""
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(a) for a in arguments])
-
-
-# Factors of ISO 16269-6, table D.4 (one-sided, unknown variance), p = 95 %, confidence 95 %
-@pytest.mark.parametrize(
-    ("count", "factor"), [(5, 4.203), (6, 3.708), (10, 2.911), (20, 2.396), (60, 2.022)]
-)
-def test_the_tolerance_factor_is_the_printed_one(count: int, factor: float) -> None:
-    assert normal_factor(count, 0.95, 0.95) == pytest.approx(factor, abs=1.5e-3)
-
-
-def test_the_order_statistic_needs_what_wilks_says() -> None:
-    assert sessions_of_order_statistic(0.95, 0.95) == 59
-    assert sessions_of_order_statistic(0.99, 0.95) == 299
-    assert sessions_of_order_statistic(0.5, 0.5) == 1
-
-
-def _factor_by_chance(count: int, confidence: float) -> float:
-    """k such that mean + k s of `count` normal values exceeds z_0.95 with this confidence."""
-    source = np.random.default_rng(1)
-    x = source.normal(size=(400_000, count))
-    k = (1.6448536 - x.mean(axis=1)) / x.std(axis=1, ddof=1)
-    return float(np.quantile(k, confidence))
-
-
-def test_the_bound_of_symmetric_logarithms_is_the_log_normal_one() -> None:
-    half = np.array([0.05, 0.2, 0.35, 0.6, 0.9])
-    logs = -11.0 + np.concatenate([half, -half])
-    bound, method = tolerance_bound(np.exp(logs), 0.95, 0.95)
-    k = _factor_by_chance(10, 1.0 - 0.05 / 2.0)
-    assert method == "log-normal"
-    assert math.log(bound) == pytest.approx(-11.0 + k * logs.std(ddof=1), abs=0.02)
-
-
-def test_a_tiny_session_hardly_widens_the_bound_and_a_large_one_does() -> None:
-    """By logarithms alone a session of 1 ns among 19 of 10 us would make it a hundredfold."""
-    usual = 1e-5 * np.exp(0.2 * np.random.default_rng(3).normal(size=19))
-    bounds = [tolerance_bound(np.append(usual, one), 0.95, 0.95)[0] for one in (1e-9, 1e-5, 1e-3)]
-    assert bounds[0] < 2.0 * bounds[1]
-    assert bounds[2] >= 1e-3
-
-
-@pytest.mark.parametrize(("count", "share"), [(7, 0.348), (20, 0.139), (59, 0.0495)])
-def test_what_no_session_held_may_be_true_of_that_many(
-    count: int, share: float, tmp_path: Path
-) -> None:
-    """A share p of bad starts leaves n sessions without one in (1 - p)^n of campaigns: in 5 %."""
-    rng = np.random.default_rng(5)
-    lucky = np.mean(np.all(rng.random((20_000, count)) >= share, axis=1))
-    assert lucky == pytest.approx(0.05, abs=4.0 * math.sqrt(0.05 * 0.95 / 20_000))
-    logs = sessions_csv(tmp_path, [1e-5] * count, count=30)
-    claim = study_logs(logs, TimingSettings()).timing.claim
-    assert claim.unseen_share == pytest.approx(share, abs=6e-4)
-    said = " ".join(run("timing", *logs).stdout.split())
-    assert (f"up to {100.0 * share:.1f} % of all starts (95 % confidence)" in said) == (count < 59)
-
-
-def test_the_largest_session_carries_it_from_59_on() -> None:
-    source = np.random.default_rng(8)
-    many = np.exp(source.normal(-11.0, 0.4, 59))
-    many[7] = 3.0 * many.max()
-    assert tolerance_bound(many, 0.95, 0.95) == (float(many.max()), "order statistic")
-    assert tolerance_bound(many[:58], 0.95, 0.95)[1] == "log-normal"
-
-
-@pytest.mark.parametrize("count", [3, 5, 20, 60])
-def test_a_new_bias_at_each_start_is_bounded_without_waste(count: int) -> None:
-    """|normal| biases, 95 % below 1.96: held as above, at most twice as wide at 20."""
-    studies = np.abs(np.random.default_rng(4).normal(size=(400, count))) + 0.1
-    bounds = np.array([tolerance_bound(q, 0.95, 0.95)[0] for q in studies])
-    share = float(np.mean(bounds >= 2.06))
-    assert share - 1.96 * math.sqrt(share * (1.0 - share) / 400) > (0.88 if count <= 5 else 0.92)
-    assert np.median(bounds) / 2.06 < {3: 30.0, 5: 6.0, 20: 2.1, 60: 1.6}[count]
-
-
-@pytest.mark.parametrize("count", [5, 20, 60])
-def test_the_claim_holds_for_sessions_that_are_heavier_than_log_normal(count: int) -> None:
-    """Logs of skewness 0.4, as flicker noise makes them; 400 studies: the lower 95 % limit of the
-    share that holds is above 88 % (5 sessions) or 92 %.
-
-    The true shares are 95 to 98 %: another seed would fail once in a hundred.
-    """
-    source = np.random.default_rng(17)
-    truth = math.exp(0.04 * 33.75)  # chi2.ppf(0.95, 50) / 2 = 33.752
-    studies = np.exp(0.04 * source.gamma(25.0, size=(400, count)))
-    bounds = np.array([tolerance_bound(q, 0.95, 0.95)[0] for q in studies])
-    held = int(np.sum(bounds >= truth))
-    share = held / 400
-    low = share - 1.96 * math.sqrt(share * (1.0 - share) / 400)
-    assert low > (0.88 if count == 5 else 0.92), share
-    assert np.median(bounds) / truth < {5: 2.5, 20: 1.6, 60: 1.5}[count]
 
 
 def test_a_claim_over_sessions(tmp_path: Path) -> None:
@@ -248,102 +124,6 @@ def test_lost_lock_of_the_card_is_lost_lock_of_the_chain(tmp_path: Path) -> None
     assert lock.size_s == pytest.approx(4e-6 + 1e-8, rel=1e-3)
     assert timing.sessions[0].samples == 400 - 31
     assert timing.event_bound_s == pytest.approx(4e-6 + 1e-8, rel=1e-3)
-
-
-def _week(folder: Path, sigma_s: float) -> list[Path]:
-    return sessions_csv(folder, [sigma_s] * 7, count=400, step_s=60.0, seed=2)
-
-
-def test_a_week_of_logs_becomes_an_entry_that_decides_a_verdict(tmp_path: Path) -> None:
-    """tau_crit of the position is sqrt(3) cm over 20 m/s: 866 us; its stamps are on UTC, the
-    reference's on the host."""
-    spec = tmp_path / "spec.yaml"
-    spec.write_text(SPEC, "utf-8")
-    entry = tmp_path / "own_clock.yaml"
-    for sigma_s, word, code in ((1e-4, "meets", 0), (1e-3, "fails", 1)):
-        logs = _week(tmp_path, sigma_s)
-        done = run("timing", *logs, "--as", "own_clock", "--write-catalog", entry, "--coverage",
-                   "0.96", "--conditions", "on the bench")  # fmt: skip
-        assert done.exit_code == 0, done.stderr
-        checked = run("check", spec, "-o", "json:-")
-        assert checked.exit_code == code, checked.stdout + checked.stderr
-        verdict = json.loads(checked.stdout)
-        assert verdict["verdict"] == word
-        (shown,) = verdict["measured"]
-        assert shown["claim"]["sessions"] == 7
-        assert shown["claim"]["session_s"] == pytest.approx(399 * 60.0)
-        assert shown["conditions"] == "on the bench"
-        hashes = {one["sha256"] for one in shown["evidence"]}
-        assert hashes == {hashlib.sha256(p.read_bytes()).hexdigest() for p in logs}
-        codes = {w["code"] for w in verdict["warnings"] if w["code"].startswith("measured")}
-        assert codes == {"measured-servo"}
-    case = load(spec)
-    offset = case.catalog.clocks["own_clock"].offset
-    said = study_logs(logs, TimingSettings(coverage=0.96)).timing
-    assert offset.bound is not None
-    assert said.bound_s is not None
-    assert said.bound_s <= float(offset.bound) <= said.bound_s * 1.0001
-
-
-def test_signs_of_an_entry(tmp_path: Path) -> None:
-    """A clock 1 ms late: host minus UTC is -1 ms; data stamped by it were valid 1 ms later."""
-    source = np.random.default_rng(0)
-    logs = []
-    for k in range(5):
-        times = START + 86400.0 * k + 60.0 * np.arange(200)
-        late = 1e-3 + source.normal(0.0, 1e-6, 200)
-        logs.append(write(tmp_path / f"r{k}.csv", made.csv_lines(times, late)))
-    means = {}
-    for kind in ("clock", "timestamping"):
-        path = tmp_path / f"{kind}.yaml"
-        assert run("timing", *logs, "--as", kind, "--entry", kind, "--write-catalog",
-                   path).exit_code == 0  # fmt: skip
-        spec = tmp_path / f"{kind}_spec.yaml"
-        spec.write_text(SPEC.replace("own_clock.yaml", path.name).replace(
-            "    clock: {candidates: [own_clock]}\n", ""), "utf-8")  # fmt: skip
-        catalog = load(spec).catalog
-        error = (catalog.clocks["clock"].offset if kind == "clock"
-                 else catalog.timestamping["timestamping"].error)  # fmt: skip
-        means[kind] = float(np.mean([float(v) for v in error.values or ()]))  # type: ignore[union-attr]
-    assert means["clock"] == pytest.approx(-1e-3, rel=1e-3)
-    assert means["timestamping"] == pytest.approx(1e-3, rel=1e-3)
-
-
-def test_what_it_means_for_a_spec_is_what_check_then_says(tmp_path: Path) -> None:
-    base = SPEC.replace("catalogs: [own_clock.yaml]\n", "").replace("own_clock", "ntp")
-    spec = tmp_path / "base.yaml"
-    spec.write_text(base, "utf-8")
-    logs = _week(tmp_path, 1e-3)
-    done = run("timing", *logs, "--spec", spec, "-o", "json:-")
-    means = json.loads(done.stdout)["spec"]
-    assert (means["before"], means["after"]) == ("meets", "fails")
-    assert means["requirement_changes"] == ["SYNC-1: pass to fail"]
-    assert means["measured_tau_s"] > 10.0 * means["tau_s"]
-    assert "asked_coverage" not in means  # k = 2, said to be 95 %
-    spec.write_text(base.replace("coverage_factor: 2", "coverage_factor: 3"), "utf-8")
-    asked = json.loads(run("timing", *logs, "--spec", spec, "-o", "json:-").stdout)["spec"]
-    assert asked["asked_coverage"] == pytest.approx(0.9973002, abs=1e-7)
-    entry = tmp_path / "own_clock.yaml"
-    run("timing", *logs, "--as", "own_clock", "--write-catalog", entry)
-    with_it = tmp_path / "with.yaml"
-    with_it.write_text(SPEC, "utf-8")
-    verdict = check_loaded(load(with_it), CheckSettings(monte_carlo=False))
-    assert verdict.design is not None
-    (stage,) = verdict.design.stages
-    (clock,) = verdict.design.clocks
-    offsets = {"utc": 0.0, "host": clock.offset_bound_s}
-    taus = {row["role"]: row["measured_tau_s"] for row in means["sensors"]}
-    own = {k: r.tau_s + offsets[r.timeline] for k, r in stage.roles.items()}
-    assert taus == pytest.approx(own, rel=2e-4)  # an entry is rounded up
-    was = check_loaded(load(spec), CheckSettings(monte_carlo=False)).design
-    assert was is not None
-    more_s = clock.offset_bound_s - was.clocks[0].offset_bound_s
-    assert {r.timeline for r in stage.roles.values()} == {"utc", "host"}
-    for row in means["sensors"]:
-        moved = row["measured_tau_s"] - row["tau_s"]
-        change = more_s if row["timeline"] == "host" else 0.0
-        assert moved == pytest.approx(change, rel=2e-4, abs=1e-12)
-        assert (row["bound_ratio"] is None) == (row["timeline"] == "utc")
 
 
 def _spoiled(folder: Path, name: str) -> list[Path]:
@@ -465,15 +245,6 @@ def test_logs_that_cannot_be_used_are_refused(name: str, tmp_path: Path) -> None
     assert not entry.exists()
 
 
-def test_toff_may_become_a_method_of_stamping_on_arrival(tmp_path: Path) -> None:
-    logs = [write(tmp_path / f"g{k}.json", [made.gpsd_line(START + 86400 * k + i, -0.1 - 1e-6 * i,
-                                                           "TOFF") for i in range(200)])
-            for k in range(5)]  # fmt: skip
-    done = run("timing", *logs, "--as", "serial", "--entry", "timestamping", "--write-catalog",
-               tmp_path / "serial.yaml")  # fmt: skip
-    assert done.exit_code == 0, done.stderr
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -490,20 +261,8 @@ def test_slips_of_the_command_line_are_named(arguments: tuple[str, str], tmp_pat
     assert "Traceback" not in done.stderr
 
 
-def test_an_entry_takes_nobody_else_s_place(tmp_path: Path) -> None:
-    logs = _week(tmp_path, 1e-5)
-    other = write(tmp_path / "other.yaml", ["clocks: {}"])
-    done = run("timing", *logs, "--as", "own", "--write-catalog", other)
-    assert done.exit_code == 2
-    assert other.read_text("utf-8") == "clocks: {}\n"
-    again = tmp_path / "again.yaml"
-    for _ in range(2):
-        assert run("timing", *logs, "--as", "own", "--write-catalog", again).exit_code == 0
-    assert run("timing", *logs, "--as", "else", "--write-catalog", again).exit_code == 2
-
-
 def test_outputs_agree_and_are_as_the_schema_says(tmp_path: Path) -> None:
-    logs = _week(tmp_path, 1e-5)
+    logs = week_of_logs(tmp_path, 1e-5)
     page, data, text = (tmp_path / f"t.{end}" for end in ("html", "json", "md"))
     done = run("timing", *logs, "--spec", ROOT / "specs" / "position_track.yaml",
                "-o", f"html:{page}", "-o", f"json:{data}", "-o", f"markdown:{text}")  # fmt: skip
@@ -548,23 +307,6 @@ def test_names_of_files_do_no_harm(tmp_path: Path) -> None:
     offset = load(spec).catalog.clocks["own_clock"].offset
     assert len(offset.evidence) == 6
     assert (offset.conditions or "").isprintable()
-
-
-def test_an_entry_has_its_own_id_and_the_spec_s_currency(tmp_path: Path) -> None:
-    logs = _week(tmp_path, 1e-5)
-    taken = run("timing", *logs, "--as", "ntp", "--write-catalog", tmp_path / "a.yaml")
-    assert taken.exit_code == 2
-    assert "built-in" in taken.stderr
-    spec, base = tmp_path / "dollars.yaml", tmp_path / "own_clock.yaml"
-    dollars = SPEC.replace("coverage_factor", "currency: USD\ncoverage_factor")
-    without = dollars.replace("catalogs: [own_clock.yaml]\n", "").replace(
-        "    clock: {candidates: [own_clock]}\n", ""
-    )
-    spec.write_text(without, "utf-8")
-    done = run("timing", *logs, "--as", "own_clock", "--write-catalog", base, "--spec", spec)
-    assert done.exit_code == 0, done.stderr
-    spec.write_text(dollars, "utf-8")
-    assert check_loaded(load(spec), CheckSettings(monte_carlo=False)).verdict == "meets"
 
 
 def test_what_a_session_remembers_is_held_against_its_length(tmp_path: Path) -> None:

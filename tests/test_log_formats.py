@@ -6,10 +6,8 @@ of the standard library or the conversion of `tests.world.geodesy`.
 
 from __future__ import annotations
 
-import base64
 import csv
 import os
-import re
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta, timezone
@@ -18,38 +16,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.logs.log import Log
 from syncline_design.logs.reading import read_log
 from syncline_design.spec.load import BadInput
+from tests.table_logs import AXES, read, same, written
 from tests.test_diagnose_log import NAMES, ROWS, columns, refusal, scanned, write
 from tests.world.geodesy import to_geodetic
 
-AXES = ("north", "east", "down")
 ORIGIN_DEG = (47.3, 8.55, 460.0)
+
+
 ORIGIN = (np.radians(47.3), np.radians(8.55), 460.0)
-
-
-def read(path: Path, mapping: dict[str, str] | None = None) -> Log:
-    return read_log([path], ["uav"], mapping or {})
-
-
-def same(left: Log, right: Log) -> None:
-    assert left.time_s == pytest.approx(right.time_s, abs=1e-9)
-    assert left.truth_m == pytest.approx(right.truth_m, abs=1e-8, nan_ok=True)
-    for a, b in zip(left.stages, right.stages, strict=True):
-        assert a.euler_rad == pytest.approx(b.euler_rad, abs=1e-10)
-        assert a.range_m == pytest.approx(b.range_m, abs=1e-8)
-        assert a.antenna_m == pytest.approx(b.antenna_m, abs=1e-8)
-
-
-def written(path: Path, separator: str = ",", decimal: str = ".", head: str = "") -> Path:
-    made = columns()
-    rows = [
-        [f"{v:.10f}".replace(".", decimal) for v in row] for row in zip(*made.values(), strict=True)
-    ]
-    text = "\n".join(separator.join(row) for row in [list(made), *rows])
-    path.write_text(head + text + "\n", encoding="utf-8")
-    return path
 
 
 SHAPES: dict[str, Callable[[str], str]] = {
@@ -291,137 +267,6 @@ def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
     start = time.monotonic()
     assert "no regular file" in refusal(tmp_path / "log.csv")
     assert time.monotonic() - start < 2.0
-
-
-def test_parquet_of_other_types(tmp_path: Path) -> None:
-    import polars as pl
-
-    plain = read(write(tmp_path / "a.csv", columns()))
-    frame = pl.DataFrame({k: np.round(v, 6) for k, v in columns().items()})
-    text = frame.with_columns(pl.col("yaw_deg").cast(pl.String).cast(pl.Categorical))
-    path = tmp_path / "log.parquet"
-    for change in (
-        text,
-        frame.with_columns(pl.col("range_m").cast(pl.String)),
-        frame.with_columns(pl.lit("tube").cast(pl.Categorical).alias("target_id")),
-        frame.with_columns((pl.col("time_s") * 1e6).cast(pl.Duration("us"))),
-        frame.with_columns(pl.col("range_m").cast(pl.Decimal(12, 6))),
-    ):
-        change.write_parquet(path)
-        log = read(path)
-        assert log.stages[0].range_m == pytest.approx(plain.stages[0].range_m, abs=1e-6)
-        assert log.stages[0].euler_rad == pytest.approx(plain.stages[0].euler_rad, abs=1e-7)
-    at = (pl.lit(datetime(2026, 3, 1)) + (pl.col("time_s") * 1e6).cast(pl.Duration("us"))).alias(
-        "time"
-    )
-    frame.with_columns(at).drop("time_s").write_parquet(path)
-    assert read(path).time_s == pytest.approx(plain.time_s, abs=1e-6)
-
-
-def with_offset(path: Path, zone: str) -> None:
-    """Puts an offset in the place of the zone `Israel` (as long) in the Arrow schema of a file.
-
-    Arrow writes such files; polars writes none.
-    """
-    found = re.search(rb"ARROW:schema.{1,6}?([A-Za-z0-9+/]{40,}=*)", path.read_bytes(), re.DOTALL)
-    assert found is not None
-    coded = found[1][found[1].index(b"/////") :]
-    schema = base64.b64decode(coded)
-    assert b"Israel" in schema
-    patched = base64.b64encode(schema.replace(b"Israel", zone.encode()))
-    path.write_bytes(path.read_bytes().replace(coded, patched))
-
-
-@pytest.mark.parametrize("zone", ["+05:30", "-03:30", "Europe/Oslo", "UTC"])
-@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
-def test_parquet_times_of_any_zone_are_utc(tmp_path: Path, zone: str, unit: str) -> None:
-    """Arrow keeps zoned stamps in UTC; offsets as zones made polars panic (exit code 1)."""
-    import polars as pl
-
-    per_second = {"ms": 10**3, "us": 10**6, "ns": 10**9}[unit]
-    start = int(datetime(2026, 3, 1, 10, tzinfo=UTC).timestamp())
-    made = pl.DataFrame(columns())
-    counts = [start * per_second + i * per_second // 8 for i in range(made.height)]
-    offset = zone[0] in "+-"
-    kind = pl.Datetime(unit, "Israel" if offset else zone)  # type: ignore[arg-type]
-    stamps = pl.Series("time", counts, dtype=pl.Int64).cast(kind)
-    path = tmp_path / "log.parquet"
-    made.drop("time_s").with_columns(stamps).write_parquet(path)
-    if offset:
-        with_offset(path, zone)
-    log = read(path)
-    assert log.time_s[0] == 10 * 3600.0
-    assert np.allclose(np.diff(log.time_s), 0.125, atol=1e-9)
-    assert log.notes == ("times are UTC, in seconds since 2026-03-01T00:00:00Z",)
-    assert "POLARS_IGNORE_TIMEZONE_PARSE_ERROR" not in os.environ
-
-
-@pytest.mark.parametrize("name", ["time", "time_s", "time_ms"])
-def test_parquet_durations_carry_their_own_unit(tmp_path: Path, name: str) -> None:
-    """`time` was refused as numbers without a unit, `time_ms` read as thousandths."""
-    import polars as pl
-
-    plain = read(write(tmp_path / "a.csv", columns()))
-    spans = (pl.col("time_s") * 1e6).round().cast(pl.Int64).cast(pl.Duration("us")).alias(name)
-    order = [name, *(key for key in columns() if key != "time_s")]
-    path = tmp_path / "log.parquet"
-    pl.DataFrame(columns()).with_columns(spans).select(order).write_parquet(path)
-    assert read(path).time_s == pytest.approx(plain.time_s, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("unit", "counts"),
-    [
-        ("us", [-(2**63), *range(39)]),  # polars panicked over its own message: exit code 1
-        ("ms", [253_370_764_800_000 + k for k in range(40)]),  # the year 9999
-        ("us", [-62_135_596_800_000_000 + k for k in range(40)]),  # the year 1
-    ],
-)
-def test_parquet_times_beyond_all_logs_are_refused(
-    tmp_path: Path, unit: str, counts: list[int]
-) -> None:
-    import polars as pl
-
-    stamps = pl.Series("time", counts, dtype=pl.Int64).cast(pl.Datetime(unit))  # type: ignore[arg-type]
-    made = pl.DataFrame(columns()).drop("time_s").with_columns(stamps)
-    made.write_parquet(tmp_path / "log.parquet")
-    said = refusal(tmp_path / "log.parquet")
-    assert "time: no time of a log in row 1" in said
-    assert "1678 to 2261" in said
-
-
-def test_parquet_times_may_miss(tmp_path: Path) -> None:
-    import polars as pl
-
-    day = [None, *(20_454 + k for k in range(39))]
-    made = pl.DataFrame(columns()).drop("time_s")
-    dates = made.with_columns(pl.Series("time", day, dtype=pl.Int32).cast(pl.Date))
-    spans = made.with_columns(
-        pl.Series("time_s", [None, *range(39)], dtype=pl.Int64).cast(pl.Duration("ms"))
-    )
-    for frame, step in ((dates, 86_400.0), (spans, 1e-3)):
-        frame.write_parquet(tmp_path / "log.parquet")
-        log = read(tmp_path / "log.parquet")
-        assert log.time_s == pytest.approx(step * np.arange(39), abs=1e-9)
-        assert log.rejected == {"no time stamp": 1}
-
-
-@pytest.mark.parametrize("kind", ["categorical", "boolean", "list", "text", "time of day", "null"])
-def test_parquet_that_holds_no_numbers_is_refused(tmp_path: Path, kind: str) -> None:
-    import polars as pl
-
-    column = pl.col("range_m")
-    changed = {
-        "categorical": pl.lit("near").cast(pl.Categorical),
-        "boolean": column > 0,
-        "list": pl.concat_list(column, column),
-        "text": pl.lit("near"),
-        "time of day": pl.lit(datetime(2026, 3, 1).time()),
-        "null": pl.lit(None),
-    }[kind].alias("range_m")
-    pl.DataFrame(columns()).with_columns(changed).write_parquet(tmp_path / "a.parquet")
-    said = refusal(tmp_path / "a.parquet")
-    assert "range_m" in said or "too few complete rows" in said
 
 
 FLAT = ("position_down_m", "roll_deg", "pitch_deg", "elevation_deg", "target_down_m")

@@ -7,7 +7,6 @@ import io
 import json
 import math
 import os
-import shlex
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -23,11 +22,7 @@ from typer.testing import CliRunner
 import syncline_design as sd
 from browsing import flaws_of
 from syncline_design.cli.app import app
-from syncline_design.comparison.meaning import DiagnosisAndDesign
-from syncline_design.diagnosis.same_system import description
-from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.records import read_as
-from syncline_design.planning import next_drive
 from syncline_design.planning.drives import whole_drive
 from syncline_design.planning.result import Plan
 from syncline_design.planning.run import plan as planned
@@ -36,42 +31,21 @@ from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.standard import MOST_LEGS, Lines, most_within
 from syncline_design.planning.telling import PlanRun
 from syncline_design.planning.wanted import PlanWanted, reach_of
-from syncline_design.report.diagnoses import render_diagnose
 from syncline_design.report.plans import render_plan
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
+from tests.planned_specs import LIMITS, SPEC, call, world
 from tests.world.bound import cramer_rao
 from tests.world.hidden import hidden
-from tests.world.motions import Sensors
 from tests.world.noise import Noise
-from tests.world.planned import driven
-from tests.world.scenarios import Scenario, scenario
 from tests.world.worldlog import make_log
 
-DEGREE = math.pi / 180.0
 ORIGIN = (47.3, 8.55, 460.0)
-LIMITS = (9.0, 50.0 * DEGREE, 40.0)  # v_max, omega_max, distance
+
+
 ACCELERATION = 2.0
-STAMPED = "timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}"
-SPEC = f"""\
-syncline: 1
-name: copter
-requirements: [{{id: ACC-1, kind: accuracy, limit: 1 m}}]
-stages:
-  - name: vehicle
-    platform: {{v_max: 9 m/s, omega_max: 50 deg/s, distance: 40 m, baseline: 0.5 m,
-      motion: multirotor, acceleration: 2 m/s^2, area: [250 m, 250 m]}}
-    position: {{sensor: {{modality: position, type: gnss,
-      sigma_position: [0.012 m, 0.012 m, 0.02 m], primitives: [pps]}}, primitive: pps, {STAMPED},
-      lever_arm: [0.25 m, -0.1 m, -0.4 m]}}
-    attitude: {{sensor: {{modality: attitude, type: ins,
-      sigma_attitude: [0.03 deg, 0.03 deg, 0.06 deg], primitives: [pps]}}, primitive: pps,
-      {STAMPED}}}
-    ranging: {{sensor: {{modality: ranging, type: lidar, sigma_range: 0.02 m,
-      sigma_bearing: [0.02 deg, 0.02 deg], primitives: [pps]}}, primitive: pps, {STAMPED},
-      lever_arm: [0.15 m, 0.05 m, 0.2 m]}}
-log: {{origin: [47.3 deg, 8.55 deg, 460 m]}}
-"""
+
+
 REACH = "latency(position)=1 ms, lever_arm(position)=1 cm"
 
 
@@ -90,14 +64,6 @@ def run(spec: Path) -> PlanRun:
 @pytest.fixture(scope="module")
 def pair(spec: Path) -> PlanRun:
     return sd.plan(spec, separate=("latency(position)", "lever_arm(position)"))
-
-
-def world(run: PlanRun, seed: int = 5) -> Scenario:
-    """The plan in the world, from what is written as waypoints, once a tenth of a second."""
-    states, aims = run.driven.states[0], run.driven.aims
-    assert aims is not None
-    return driven("copter", seed, states.time_s, states.position_m, states.euler_rad,
-                  aims.targets_m, aims.aimed, Sensors(), LIMITS)  # fmt: skip
 
 
 def test_sigma_is_the_cramer_rao_bound_of_an_independent_simulator(run: PlanRun) -> None:
@@ -393,10 +359,6 @@ def test_a_flown_log_that_the_platform_cannot_have_made_is_said_to_be_odd(
     assert any("the spec's v_max is 0.5 m/s" in one for one in flown["cautions"])
 
 
-def call(*words: object) -> Any:
-    return CliRunner().invoke(app, ["plan", *map(str, words)])
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -471,202 +433,6 @@ def test_places_on_the_globe_need_an_origin(tmp_path: Path) -> None:
     assert done.exit_code == 2
     assert "log: {origin: [47.3 deg, 8.55 deg, 460 m]}" in done.stderr
     assert not (tmp_path / "x.kml").exists()
-
-
-LARGE_S = 0.3
-LATENCY, LAG = "latency(position)", "filter_lag(position)"
-
-
-@pytest.fixture(scope="module")
-def sized(spec: Path) -> PlanRun:
-    return sd.plan(spec, separate=(f"{LATENCY}={LARGE_S} s", LAG))
-
-
-def test_a_large_latency_is_told_from_a_filter_lag_that_a_small_one_is_like(
-    spec: Path, sized: PlanRun
-) -> None:
-    """To first order both shift by -T v.  Of a known size they are judged as they are."""
-    assert sized.result.reached
-    assert sized.result.sized
-    assert sized.result.inseparable == ()
-    first = call(spec, "--separate", LATENCY, LAG)
-    small = call(spec, "--separate", f"{LATENCY}=2 ms", LAG)
-    for done, words in (
-        (first, "apart, as far as their effects of first order go"),
-        (small, "apart, at the size that is known, in these minutes"),
-    ):
-        assert done.exit_code == 1
-        assert f"No drive of this platform tells {LATENCY} and {LAG} {words}" in " ".join(
-            done.stdout.split()
-        )
-
-
-def test_by_how_much_a_latency_beats_a_lag_is_what_the_world_says(sized: PlanRun) -> None:
-    """The errors of both by a simulator of its own, with the same noise, weighted by the scatter of
-    its own draws, row by row; the lag nearest to the latency by looking."""
-    run, draws = world(sized), 200
-    clean = make_log(run).error()
-    scattered = np.array([make_log(replace(run, seed=k)).error() for k in range(draws)])
-    scattered -= scattered.mean(axis=0)
-    covariance = np.einsum("kri,krj->rij", scattered, scattered) / (draws - 1)
-    weight = np.linalg.inv(covariance) * (draws - 5) / (draws - 1)  # mean of an inverse Wishart
-    late = make_log(run, (hidden("latency", "position", latency_s=LARGE_S),)).error() - clean
-    found = []
-    for constant in np.linspace(0.2, 0.4, 41):
-        lag = hidden("filter_lag", "position", time_constant_s=float(constant))
-        apart = late - (make_log(run, (lag,)).error() - clean)
-        found.append(float(np.einsum("ri,rij,rj->", apart, weight, apart)))
-    (pair,) = sized.result.pairs
-    assert pair.noncentrality == pytest.approx(min(found), rel=0.15)
-    assert min(found) < 0.5 * max(found)
-
-
-def test_a_class_is_told_at_once_and_what_no_drive_tells_is_left_out(spec: Path) -> None:
-    """Several rivals in one plan: each with its figures."""
-    rivals = "lever_arm(position), datum_offset(target)"
-    found = sd.plan(spec, separate=(f"{LATENCY}=20 ms", rivals)).result
-    assert found.reached
-    assert [pair.second for pair in found.pairs] == ["lever_arm(position)", "datum_offset(target)"]
-    assert all(pair.separated and pair.sizes == {"latency_s": 0.02} for pair in found.pairs)
-
-
-@pytest.mark.parametrize(
-    ("first", "words"),
-    [
-        (f"{LATENCY}=5 m", "latency_s is no such quantity"),
-        (f"{LATENCY}=0 s", "expected a size other than 0"),
-        (f"{LATENCY}=[1 s, 2 s]", "expected 1 size, of latency_s; found 2"),
-        ("lever_arm(position)=1 cm", "expected 3 sizes, of x_m, y_m, z_m; found 1"),
-        (f"{LATENCY}=", "latency_s is no such quantity"),
-    ],
-)
-def test_sizes_that_are_none_are_refused(spec: Path, first: str, words: str) -> None:
-    done = call(spec, "--separate", first, LAG)
-    assert done.exit_code == 2
-    assert words in done.stderr
-
-
-def test_doubles_are_said_to_be_doubles(spec: Path) -> None:
-    """Only R (l_L - l_G) is in the error at equal stamps: no drive tells the two lever arms."""
-    done = call(spec, "--separate", "lever_arm(position)", "lever_arm(ranging)")
-    assert done.exit_code == 1
-    assert "No drive of this platform tells lever_arm(position) and lever_arm(ranging)" in " ".join(
-        done.stdout.split()
-    )
-
-
-@pytest.fixture(scope="module")
-def straight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A straight line at one speed, 30 ms of GNSS latency hidden in it: spec and log."""
-    folder = tmp_path_factory.mktemp("straight")
-    line = scenario("straight_constant_speed", 3, 40.0, 10.0)
-    log = make_log(line, (hidden("latency", "position", latency_s=0.03),), Noise())
-    spec = folder / "line.yaml"
-    spec.write_text(log.spec_yaml(), encoding="utf-8")
-    return spec, log.to_csv(folder / "line.csv")
-
-
-@pytest.fixture(scope="module")
-def diagnosed(straight: tuple[Path, Path]) -> Path:
-    """What `diagnose` says of that line: its JSON, and its text beside it."""
-    spec, log = straight
-    result = spec.parent / "line.json"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(next_drive, "LIMIT_S", 600.0)  # what is found, however busy the machine is
-        done = CliRunner().invoke(
-            app, ["diagnose", str(spec), str(log), "--max-effects", "1", "-o", f"json:{result}"]
-        )
-    assert done.exit_code == 1
-    result.with_suffix(".txt").write_text(done.stdout, encoding="utf-8")
-    return result
-
-
-def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
-    straight: tuple[Path, Path], diagnosed: Path
-) -> None:
-    spec, result = straight[0], diagnosed
-    data = json.loads(result.read_text("utf-8"))
-    jsonschema.validate(data, result_schema("diagnosis"))
-    named = {(f["effect"], f["sensor"]): f for f in data["findings"]}
-    aliases = {a["effect"] for f in named.values() for a in f["aliases"]}
-    assert {"latency", "lever_arm"} <= {name for name, _ in named} | aliases
-    drive = data["plan"]
-    assert drive["reached"]
-    assert drive["first"] != drive["second"]
-    assert drive["command"].startswith("syncline-design plan ")
-    assert drive["command"].removeprefix("syncline-design ")[:30] in " ".join(
-        result.with_suffix(".txt").read_text("utf-8").split()
-    )
-    words = shlex.split(drive["command"])[2:]
-    whole = call(*words, "-o", "json:-")
-    assert whole.exit_code == 0
-    assert [leg["words"] for leg in json.loads(whole.stdout)["legs"]] == [
-        leg.partition(": ")[2] for leg in drive["legs"]
-    ]
-    from_file = call(spec, "--diagnosis", result, "-o", "json:-")
-    assert data["system"] == json.loads(json.dumps(description(pinned_system(load(spec)))))
-    assert "cautions" not in json.loads(from_file.stdout)
-    pairs = json.loads(from_file.stdout)["pairs"]
-    assert pairs[0]["sizes"]["latency_s"] == pytest.approx(0.03, rel=0.1)
-    assert all(pair["separated"] for pair in pairs)
-
-
-def test_a_diagnosis_without_a_drive_says_why_and_prints_the_command_that_looks_for_one(
-    straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    spec, _ = straight
-    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
-    case = load(spec)
-    monkeypatch.setattr(next_drive, "LIMIT_S", 0.0)
-    late = next_drive.next_drive(case, found)
-    assert late is not None
-    assert (late.legs, late.minutes, late.reached) == ((), None, False)
-    *words, asked, rivals = shlex.split(late.command)
-    assert words == ["syncline-design", "plan", str(spec), "--separate"]
-    assert asked.startswith("latency(position)=30")
-    assert "lever_arm(position)" in rivals.split(", ")
-    words = render_diagnose("markdown", replace(found, plan=late)).replace("\\", "")
-    assert "No drive that does was found in the time" in words
-    assert late.command in words
-    jsonschema.validate(replace(found, plan=late).to_json(), result_schema("diagnosis"))
-
-
-def test_a_drive_of_more_than_some_hours_is_none_and_no_manoeuvre_is_promised(
-    straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
-    arm = next(r for r in whole.findings[0].aliases if r.effect == "lever_arm")
-    found = replace(whole, findings=(replace(whole.findings[0], aliases=(arm,)),))
-    monkeypatch.setattr(next_drive, "LIMIT_S", 600.0)  # however busy the machine is
-    monkeypatch.setattr(next_drive, "LONGEST_S", 1.0)
-    drive = next_drive.next_drive(load(straight[0]), found)
-    assert drive is not None
-    assert (drive.minutes, drive.legs) == (None, ())
-    assert drive.why_none is not None
-    assert drive.why_none.startswith("No test drive of this platform of up to 1 s was found")
-    words = render_diagnose("markdown", replace(found, plan=drive)).replace("\\", "")
-    assert "It takes" not in words
-    assert "To separate them" not in words
-    assert "No drive that does was found." in words
-
-
-def test_a_class_that_no_drive_tells_is_said_to_be_one(
-    straight: tuple[Path, Path], diagnosed: Path
-) -> None:
-    """Two lever arms of one rigid body shift every row alike, whatever is driven."""
-    spec, _ = straight
-    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
-    arms = ("lever_arm", "position"), ("lever_arm", "ranging")
-    one, other = (
-        replace(r, effect=effect, sensor=sensor)
-        for (effect, sensor), r in zip(arms, [found.findings[0].aliases[0]] * 2, strict=True)
-    )
-    alone = replace(found.findings[0], effect=one.effect, sensor=one.sensor, aliases=(other,))
-    ends = next_drive.next_drive(load(spec), replace(found, findings=(alone,)))
-    assert ends is not None
-    assert ends.why_none is not None
-    assert "lever_arm(position) from lever_arm(ranging)" in ends.why_none
-    assert ends.legs == ()
 
 
 def test_a_drive_longer_than_its_minutes_is_not_called_the_best_for_them(pair: PlanRun) -> None:

@@ -1,0 +1,296 @@
+"""`accept` with logs of clocks and of stamps: bounds that are borne out, broken, or not shown."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.comparison.accept import AcceptSettings, accept
+from syncline_design.spec.load import BadInput, load
+from tests.acceptance_samples import ROOT, run
+from tests.clock_logs import sessions_csv, statistics_line, tracking_line
+
+CLOCKED = """\
+syncline: 1
+name: two timelines
+requirements: [{id: ACC-1, kind: accuracy, limit: 0.30 m}]
+catalogs: [clocks.yaml]
+stages:
+  - name: uav
+    platform: {v_max: 2 m/s, omega_max: 0.001 deg/s, distance: 0.1 m, baseline: 0 m}
+    clock: {candidates: [own]}
+    position: {sensor: {modality: position, sigma_position: 1 cm, primitives: []},
+               timestamping: {timeline: utc, error: {distribution: uniform, low: -2 ms,
+                                                     high: 2 ms}}}
+    attitude: {sensor: {modality: attitude, sigma_attitude: 0.01 deg, primitives: []},
+               timestamping: {error: {distribution: constant, value: 0 s}}}
+    ranging: {sensor: {modality: ranging, sigma_range: 1 cm, sigma_bearing: 0.01 deg,
+              primitives: []}, timestamping: {error: {distribution: constant, value: 0 s}}}
+"""
+
+
+OWN_CLOCK = """\
+clocks:
+  own: {name: own, offset: {distribution: uniform, low: -1 ms, high: 1 ms},
+        cost: 0 EUR, mass: 0 g, power: 0 W, source: made for this test}
+"""
+
+
+@pytest.fixture
+def clocked(tmp_path: Path) -> Path:
+    (tmp_path / "clocks.yaml").write_text(OWN_CLOCK, "utf-8")
+    path = tmp_path / "clocked.yaml"
+    path.write_text(CLOCKED, "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("sigma_s", "sessions", "status", "code"),
+    [(1e-4, 20, "holds", 0), (1e-2, 20, "broken", 1), (1e-4, 1, "not_shown", 3)],
+)
+def test_clock_logs_against_the_clock_of_the_spec(
+    clocked: Path, sigma_s: float, sessions: int, status: str, code: int
+) -> None:
+    """White offsets of 0.1 ms stay within 1 ms, of 10 ms do not; one session claims nothing."""
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [sigma_s] * sessions, count=800, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    result = json.loads(done.stdout)
+    assert (done.exit_code, result["verdict"]) == (code, status), done.stdout
+    (row,) = result["assumptions"]
+    assert (row["assumption"], row["assumed"], row["status"]) == ("clock", 1e-3, status)
+    assert row["measured"]["value"] > 1.9 * sigma_s  # two sigma hold 95 % of white noise
+    assert {one["read_as"] for one in result["evidence"]} == {"clock"}
+
+
+@pytest.mark.parametrize(
+    ("sigma_s", "sessions", "timeline", "status", "words"),
+    [
+        (1e-4, 20, "utc", "holds", "does not turn the verdict"),
+        (1e-4, 1, "utc", "not_shown", "no claim"),
+        (1e-2, 20, "utc", "broken", "fails SYNC"),
+        (1e-2, 1, "utc", "broken", "fails SYNC"),
+        (1e-2, 20, "host", "holds", "cancels"),
+    ],
+)
+def test_the_log_of_a_clock_that_the_spec_does_not_name_counts(
+    clocked: Path, sigma_s: float, sessions: int, timeline: str, status: str, words: str
+) -> None:
+    """Without `clock` its offset is taken as 0: 20 ms are beyond the position's 8.7 ms."""
+    text = CLOCKED.replace("    clock: {candidates: [own]}\n", "")
+    clocked.write_text(text.replace("timeline: utc", f"timeline: {timeline}"), "utf-8")
+    alone = run("accept", clocked, "--only", "clock", "-o", "json:-")
+    assert json.loads(alone.stdout)["assumptions"] == []
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [sigma_s] * sessions, count=800, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert (row["assumption"], row["assumed"], row["status"]) == ("clock", 0.0, status), row
+    assert words in row["evidence"]
+    assert done.exit_code == {"holds": 0, "broken": 1, "not_shown": 3}[status]
+
+
+def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [1e-4] * 20, count=800, step_s=10.0)
+    given = [part for log in logs for part in ("--assign", f"uav/position={log}")]
+    done = run("accept", clocked, *given, "--only", "timing", "-o", "json:-")
+    statuses = {row["role"]: row["status"] for row in json.loads(done.stdout)["assumptions"]}
+    assert statuses == {"position": "holds", "attitude": "not_shown", "ranging": "not_shown"}
+    assert done.exit_code == 3
+
+
+@pytest.mark.parametrize(("factor", "status", "code"), [(2, "not_shown", 3), (3, "broken", 1)])
+def test_a_clock_that_steps_beyond_its_bound_now_and_then_is_not_borne_out(
+    clocked: Path, factor: int, status: str, code: int
+) -> None:
+    """5 ms for 4 % of the time: beyond 1 ms for more than 0.27 %, not more than 4.55 % of it."""
+    text = CLOCKED.replace("stages:", f"coverage_factor: {factor}\nstages:")
+    clocked.write_text(text, "utf-8")
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    rng = np.random.default_rng(3)
+    logs = []
+    for k in range(8):
+        time_s = 1.7e9 + 86400.0 * k + 10.0 * np.arange(400)
+        late = 1e-4 * rng.normal(size=400)
+        late[200:216] += 5e-3
+        rows = (f"{t:.1f},{x:.9f}" for t, x in zip(time_s, late, strict=True))
+        path = folder / f"run{k}.csv"
+        path.write_text("\n".join(["time_s,offset_s", *rows]) + "\n", "utf-8")
+        logs.append(path)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert (row["status"], done.exit_code) == (status, code), row
+
+
+def test_sessions_shorter_than_the_horizon_bear_nothing_out(clocked: Path) -> None:
+    """Over 2 000 s nothing drifts; the spec's horizon is 1 h unless it says otherwise."""
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [1e-4] * 8, count=400, step_s=5.0)
+    asked = ("--only", "clock", "-o", "json:-")
+    done = run("accept", clocked, *logs, *asked)
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert (row["status"], done.exit_code) == ("not_shown", 3)
+    assert "horizon is 1 h" in row["evidence"]
+    clocked.write_text(CLOCKED.replace("stages:", "horizon: {duration: 30 min}\nstages:"), "utf-8")
+    assert run("accept", clocked, *logs, *asked).exit_code == 0
+
+
+def test_few_sessions_that_keep_a_bound_do_not_break_it(clocked: Path) -> None:
+    """Levels of 50, 100 and 800 us: from three the bound over sessions is far beyond 1 ms."""
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [1e-5, 3e-5, 2e-4], count=800, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert row["measured"]["value"] > row["assumed"] == 1e-3
+    assert (row["status"], done.exit_code) == ("not_shown", 3), row
+    assert "more sessions" in row["evidence"]
+
+
+def test_a_servo_that_nulls_its_own_offsets_bears_nothing_out(clocked: Path) -> None:
+    """statistics.log holds no delays: an asymmetric path stays hidden; tracking.log bounds it."""
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    codes = {}
+    for kind, line in (("statistics", statistics_line), ("tracking", tracking_line)):
+        logs = []
+        for k in range(8):
+            times = 1.8e9 + 86400.0 * k + 16.0 * np.arange(400)
+            path = folder / f"{kind}_{k}.log"
+            late = 1e-5 * np.random.default_rng(k).normal(size=400)
+            rows = (line(t, x) for t, x in zip(times, late, strict=True))
+            path.write_text("\n".join(rows) + "\n", "utf-8")
+            logs.append(path)
+        done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+        (row,) = json.loads(done.stdout)["assumptions"]
+        codes[kind] = (row["status"], "servo" in row["evidence"])
+    assert codes == {"statistics": ("not_shown", True), "tracking": ("holds", False)}
+
+
+def stamped(path: Path, fault_s: float, early_s: float = 0.0) -> Path:
+    """Ten minutes at 10 Hz, received with gamma delays of 0.1 ms; the second half moved."""
+    rng = np.random.default_rng(7)
+    true_s = 1.7e9 + 0.1 * np.arange(6000)
+    stamp_s = true_s - early_s + np.where(np.arange(6000) < 3000, 0.0, fault_s)
+    receive_s = true_s + 1e-4 * rng.gamma(2.0, size=6000)
+    rows = (f"{a:.9f},{b:.9f}" for a, b in zip(stamp_s, receive_s, strict=True))
+    path.write_text("\n".join(["stamp_s,receive_s", *rows]) + "\n", "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("fault_s", "status"), [(0.0, "holds"), (1.0, "broken")])
+def test_stamps_and_receipts_of_one_sensor(clocked: Path, fault_s: float, status: str) -> None:
+    """Delays of 0.1 ms scatter by less than the 2 ms assumed; a slip of a second is a fault."""
+    log = stamped(clocked.parent / "uav_position.csv", fault_s)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    result = json.loads(done.stdout)
+    rows = {row["role"]: row for row in result["assumptions"]}
+    assert rows["position"]["status"] == status, rows["position"]
+    assert ("slip" in rows["position"]["evidence"]) == (status == "broken")
+    assert rows["attitude"]["status"] == "not_shown"
+    assert [one["read_as"] for one in result["evidence"]] == ["stamps"]
+    assert done.exit_code == {"holds": 3, "broken": 1}[status]
+
+
+def test_a_step_that_stays_within_what_is_assumed_breaks_nothing(clocked: Path) -> None:
+    """0.5 ms of the 2 ms assumed: every receipt stays within 2 ms of its stamp."""
+    log = stamped(clocked.parent / "uav_position.csv", -0.0005)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == "holds", rows["position"]
+    assert "step" in rows["position"]["evidence"]
+    assert 0.0005 < rows["position"]["measured"]["value"] <= 0.002
+
+
+@pytest.mark.parametrize(("messages", "status"), [(58, "not_shown"), (59, "holds")])
+def test_a_few_messages_bear_no_bound_out(clocked: Path, messages: int, status: str) -> None:
+    """59 of 59 within a bound show 95 % of all within it with 95 % confidence: 0.95^59 < 0.05."""
+    assert 0.95**59 < 0.05 < 0.95**58
+    log = stamped(clocked.parent / "uav_position.csv", 0.0)
+    log.write_text("\n".join(log.read_text("utf-8").splitlines()[: messages + 1]) + "\n", "utf-8")
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == status, rows["position"]
+
+
+def test_faults_of_the_recorder_are_not_those_of_the_stamps(clocked: Path) -> None:
+    """The recorder's clock is set forward by 3 s half way: of the stamps nothing is shown."""
+    log = stamped(clocked.parent / "uav_position.csv", 0.0)
+    lines = log.read_text("utf-8").splitlines()
+    moved = [lines[0]]
+    for k, line in enumerate(lines[1:]):
+        stamp, receive = line.split(",")
+        moved.append(f"{stamp},{float(receive) + (3.0 if 2000 <= k < 4000 else 0.0):.9f}")
+    log.write_text("\n".join(moved) + "\n", "utf-8")
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert "recorder_clock" in rows["position"]["evidence"]
+    assert (rows["position"]["status"], done.exit_code) == ("not_shown", 3), rows["position"]
+
+
+def test_stamps_that_may_be_early_by_more_than_tau_are_not_shown(clocked: Path) -> None:
+    """30 ms before every receipt: delay or error, the log cannot say; 2 ms are assumed."""
+    log = stamped(clocked.parent / "uav_position.csv", 0.0, 0.03)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == "not_shown"
+    assert 0.03 < rows["position"]["measured"]["value"] < 0.032
+
+
+def test_stamps_ahead_of_their_receipts_are_so_much_off_and_no_more(clocked: Path) -> None:
+    """1.9 ms ahead of the truth, receipts up to 1.5 ms after it: by the table, 1.9 ms at most."""
+    log = stamped(clocked.parent / "uav_position.csv", 0.0, -0.0019)
+    stamp, receive = np.loadtxt(log, delimiter=",", skiprows=1, unpack=True)
+    apart = np.abs(receive - stamp)
+    assert np.max(apart) < 0.002 < np.max(apart) + np.ptp(receive - stamp)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == "holds", rows["position"]
+    assert rows["position"]["measured"]["value"] == pytest.approx(np.max(apart), rel=0.02)
+
+
+def test_what_cannot_be_asked_is_refused(clocked: Path, tmp_path: Path) -> None:
+    for arguments, words in (
+        (["--only", "colour"], "expected some of timing"),
+        (["--assign", "clock.log"], "expected OF=LOG"),
+        (["--assign", "boat=x.log"], "a vehicle or STAGE/ROLE: uav, uav/position"),
+        ([tmp_path / "none.csv"], "none.csv"),
+    ):
+        done = run("accept", clocked, *arguments)
+        assert (done.exit_code, done.stdout) == (2, ""), done.stderr
+        assert words in done.stderr
+
+
+def test_a_table_of_stamps_is_not_assigned_but_named(clocked: Path) -> None:
+    log = stamped(clocked.parent / "stamps.csv", 0.0)
+    done = run("accept", clocked, "--assign", f"uav/position={log}", "--only", "timing")
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "uav_position.csv" in done.stderr
+    assert "log: {streams: {position: stamps}}" in done.stderr
+
+
+def test_a_clock_log_of_several_vehicles_needs_an_owner(tmp_path: Path) -> None:
+    (log,) = sessions_csv(tmp_path, [1e-4], count=800, step_s=10.0)
+    with pytest.raises(BadInput, match="several vehicles"):
+        accept(load(ROOT / "specs" / "rov_relay.yaml"), [log], AcceptSettings(("clock",)), seed=0)
+
+
+def test_a_spec_that_fails_on_paper_is_not_accepted(clocked: Path) -> None:
+    clocked.write_text(CLOCKED.replace("0.30 m", "1 mm"), "utf-8")
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [1e-4] * 20, count=800, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock")
+    assert done.exit_code == 1
+    assert "does not meet its requirements on paper" in done.stdout
+    result = json.loads(run("accept", clocked, *logs, "--only", "clock", "-o", "json:-").stdout)
+    assert (result["verdict"], result["broken_by"]) == ("broken", ["spec"])

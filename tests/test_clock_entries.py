@@ -1,0 +1,147 @@
+"""The catalog entry that logs become: its signs, its place, what `check` then says."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.clocks.study import TimingSettings, study_logs
+from syncline_design.spec.load import load
+from syncline_design.verdict.verify import CheckSettings, check_loaded
+from tests import clock_logs as made
+from tests.clock_logs import START, write
+from tests.clocked_specs import SPEC, run, week_of_logs
+
+
+def test_a_week_of_logs_becomes_an_entry_that_decides_a_verdict(tmp_path: Path) -> None:
+    """tau_crit of the position is sqrt(3) cm over 20 m/s: 866 us; its stamps are on UTC, the
+    reference's on the host."""
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(SPEC, "utf-8")
+    entry = tmp_path / "own_clock.yaml"
+    for sigma_s, word, code in ((1e-4, "meets", 0), (1e-3, "fails", 1)):
+        logs = week_of_logs(tmp_path, sigma_s)
+        done = run("timing", *logs, "--as", "own_clock", "--write-catalog", entry, "--coverage",
+                   "0.96", "--conditions", "on the bench")  # fmt: skip
+        assert done.exit_code == 0, done.stderr
+        checked = run("check", spec, "-o", "json:-")
+        assert checked.exit_code == code, checked.stdout + checked.stderr
+        verdict = json.loads(checked.stdout)
+        assert verdict["verdict"] == word
+        (shown,) = verdict["measured"]
+        assert shown["claim"]["sessions"] == 7
+        assert shown["claim"]["session_s"] == pytest.approx(399 * 60.0)
+        assert shown["conditions"] == "on the bench"
+        hashes = {one["sha256"] for one in shown["evidence"]}
+        assert hashes == {hashlib.sha256(p.read_bytes()).hexdigest() for p in logs}
+        codes = {w["code"] for w in verdict["warnings"] if w["code"].startswith("measured")}
+        assert codes == {"measured-servo"}
+    case = load(spec)
+    offset = case.catalog.clocks["own_clock"].offset
+    said = study_logs(logs, TimingSettings(coverage=0.96)).timing
+    assert offset.bound is not None
+    assert said.bound_s is not None
+    assert said.bound_s <= float(offset.bound) <= said.bound_s * 1.0001
+
+
+def test_signs_of_an_entry(tmp_path: Path) -> None:
+    """A clock 1 ms late: host minus UTC is -1 ms; data stamped by it were valid 1 ms later."""
+    source = np.random.default_rng(0)
+    logs = []
+    for k in range(5):
+        times = START + 86400.0 * k + 60.0 * np.arange(200)
+        late = 1e-3 + source.normal(0.0, 1e-6, 200)
+        logs.append(write(tmp_path / f"r{k}.csv", made.csv_lines(times, late)))
+    means = {}
+    for kind in ("clock", "timestamping"):
+        path = tmp_path / f"{kind}.yaml"
+        assert run("timing", *logs, "--as", kind, "--entry", kind, "--write-catalog",
+                   path).exit_code == 0  # fmt: skip
+        spec = tmp_path / f"{kind}_spec.yaml"
+        spec.write_text(SPEC.replace("own_clock.yaml", path.name).replace(
+            "    clock: {candidates: [own_clock]}\n", ""), "utf-8")  # fmt: skip
+        catalog = load(spec).catalog
+        error = (catalog.clocks["clock"].offset if kind == "clock"
+                 else catalog.timestamping["timestamping"].error)  # fmt: skip
+        means[kind] = float(np.mean([float(v) for v in error.values or ()]))  # type: ignore[union-attr]
+    assert means["clock"] == pytest.approx(-1e-3, rel=1e-3)
+    assert means["timestamping"] == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_what_it_means_for_a_spec_is_what_check_then_says(tmp_path: Path) -> None:
+    base = SPEC.replace("catalogs: [own_clock.yaml]\n", "").replace("own_clock", "ntp")
+    spec = tmp_path / "base.yaml"
+    spec.write_text(base, "utf-8")
+    logs = week_of_logs(tmp_path, 1e-3)
+    done = run("timing", *logs, "--spec", spec, "-o", "json:-")
+    means = json.loads(done.stdout)["spec"]
+    assert (means["before"], means["after"]) == ("meets", "fails")
+    assert means["requirement_changes"] == ["SYNC-1: pass to fail"]
+    assert means["measured_tau_s"] > 10.0 * means["tau_s"]
+    assert "asked_coverage" not in means  # k = 2, said to be 95 %
+    spec.write_text(base.replace("coverage_factor: 2", "coverage_factor: 3"), "utf-8")
+    asked = json.loads(run("timing", *logs, "--spec", spec, "-o", "json:-").stdout)["spec"]
+    assert asked["asked_coverage"] == pytest.approx(0.9973002, abs=1e-7)
+    entry = tmp_path / "own_clock.yaml"
+    run("timing", *logs, "--as", "own_clock", "--write-catalog", entry)
+    with_it = tmp_path / "with.yaml"
+    with_it.write_text(SPEC, "utf-8")
+    verdict = check_loaded(load(with_it), CheckSettings(monte_carlo=False))
+    assert verdict.design is not None
+    (stage,) = verdict.design.stages
+    (clock,) = verdict.design.clocks
+    offsets = {"utc": 0.0, "host": clock.offset_bound_s}
+    taus = {row["role"]: row["measured_tau_s"] for row in means["sensors"]}
+    own = {k: r.tau_s + offsets[r.timeline] for k, r in stage.roles.items()}
+    assert taus == pytest.approx(own, rel=2e-4)  # an entry is rounded up
+    was = check_loaded(load(spec), CheckSettings(monte_carlo=False)).design
+    assert was is not None
+    more_s = clock.offset_bound_s - was.clocks[0].offset_bound_s
+    assert {r.timeline for r in stage.roles.values()} == {"utc", "host"}
+    for row in means["sensors"]:
+        moved = row["measured_tau_s"] - row["tau_s"]
+        change = more_s if row["timeline"] == "host" else 0.0
+        assert moved == pytest.approx(change, rel=2e-4, abs=1e-12)
+        assert (row["bound_ratio"] is None) == (row["timeline"] == "utc")
+
+
+def test_toff_may_become_a_method_of_stamping_on_arrival(tmp_path: Path) -> None:
+    logs = [write(tmp_path / f"g{k}.json", [made.gpsd_line(START + 86400 * k + i, -0.1 - 1e-6 * i,
+                                                           "TOFF") for i in range(200)])
+            for k in range(5)]  # fmt: skip
+    done = run("timing", *logs, "--as", "serial", "--entry", "timestamping", "--write-catalog",
+               tmp_path / "serial.yaml")  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+
+
+def test_an_entry_takes_nobody_else_s_place(tmp_path: Path) -> None:
+    logs = week_of_logs(tmp_path, 1e-5)
+    other = write(tmp_path / "other.yaml", ["clocks: {}"])
+    done = run("timing", *logs, "--as", "own", "--write-catalog", other)
+    assert done.exit_code == 2
+    assert other.read_text("utf-8") == "clocks: {}\n"
+    again = tmp_path / "again.yaml"
+    for _ in range(2):
+        assert run("timing", *logs, "--as", "own", "--write-catalog", again).exit_code == 0
+    assert run("timing", *logs, "--as", "else", "--write-catalog", again).exit_code == 2
+
+
+def test_an_entry_has_its_own_id_and_the_spec_s_currency(tmp_path: Path) -> None:
+    logs = week_of_logs(tmp_path, 1e-5)
+    taken = run("timing", *logs, "--as", "ntp", "--write-catalog", tmp_path / "a.yaml")
+    assert taken.exit_code == 2
+    assert "built-in" in taken.stderr
+    spec, base = tmp_path / "dollars.yaml", tmp_path / "own_clock.yaml"
+    dollars = SPEC.replace("coverage_factor", "currency: USD\ncoverage_factor")
+    without = dollars.replace("catalogs: [own_clock.yaml]\n", "").replace(
+        "    clock: {candidates: [own_clock]}\n", ""
+    )
+    spec.write_text(without, "utf-8")
+    done = run("timing", *logs, "--as", "own_clock", "--write-catalog", base, "--spec", spec)
+    assert done.exit_code == 0, done.stderr
+    spec.write_text(dollars, "utf-8")
+    assert check_loaded(load(spec), CheckSettings(monte_carlo=False)).verdict == "meets"

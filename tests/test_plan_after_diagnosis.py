@@ -1,0 +1,141 @@
+"""The drive that a diagnosis ends with: what tells its class, or that nothing does."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import pytest
+from typer.testing import CliRunner
+
+from syncline_design.cli.app import app
+from syncline_design.comparison.meaning import DiagnosisAndDesign
+from syncline_design.diagnosis.same_system import description
+from syncline_design.diagnosis.system import pinned_system
+from syncline_design.machine.records import read_as
+from syncline_design.planning import next_drive
+from syncline_design.report.diagnoses import render_diagnose
+from syncline_design.report.result_schemas import result_schema
+from syncline_design.spec.load import load
+from tests.planned_specs import call
+from tests.world.hidden import hidden
+from tests.world.noise import Noise
+from tests.world.scenarios import scenario
+from tests.world.worldlog import make_log
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A straight line at one speed, 30 ms of GNSS latency hidden in it: spec and log."""
+    folder = tmp_path_factory.mktemp("straight")
+    line = scenario("straight_constant_speed", 3, 40.0, 10.0)
+    log = make_log(line, (hidden("latency", "position", latency_s=0.03),), Noise())
+    spec = folder / "line.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    return spec, log.to_csv(folder / "line.csv")
+
+
+@pytest.fixture(scope="module")
+def diagnosed(straight: tuple[Path, Path]) -> Path:
+    """What `diagnose` says of that line: its JSON, and its text beside it."""
+    spec, log = straight
+    result = spec.parent / "line.json"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(next_drive, "LIMIT_S", 600.0)  # what is found, however busy the machine is
+        done = CliRunner().invoke(
+            app, ["diagnose", str(spec), str(log), "--max-effects", "1", "-o", f"json:{result}"]
+        )
+    assert done.exit_code == 1
+    result.with_suffix(".txt").write_text(done.stdout, encoding="utf-8")
+    return result
+
+
+def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
+    straight: tuple[Path, Path], diagnosed: Path
+) -> None:
+    spec, result = straight[0], diagnosed
+    data = json.loads(result.read_text("utf-8"))
+    jsonschema.validate(data, result_schema("diagnosis"))
+    named = {(f["effect"], f["sensor"]): f for f in data["findings"]}
+    aliases = {a["effect"] for f in named.values() for a in f["aliases"]}
+    assert {"latency", "lever_arm"} <= {name for name, _ in named} | aliases
+    drive = data["plan"]
+    assert drive["reached"]
+    assert drive["first"] != drive["second"]
+    assert drive["command"].startswith("syncline-design plan ")
+    assert drive["command"].removeprefix("syncline-design ")[:30] in " ".join(
+        result.with_suffix(".txt").read_text("utf-8").split()
+    )
+    words = shlex.split(drive["command"])[2:]
+    whole = call(*words, "-o", "json:-")
+    assert whole.exit_code == 0
+    assert [leg["words"] for leg in json.loads(whole.stdout)["legs"]] == [
+        leg.partition(": ")[2] for leg in drive["legs"]
+    ]
+    from_file = call(spec, "--diagnosis", result, "-o", "json:-")
+    assert data["system"] == json.loads(json.dumps(description(pinned_system(load(spec)))))
+    assert "cautions" not in json.loads(from_file.stdout)
+    pairs = json.loads(from_file.stdout)["pairs"]
+    assert pairs[0]["sizes"]["latency_s"] == pytest.approx(0.03, rel=0.1)
+    assert all(pair["separated"] for pair in pairs)
+
+
+def test_a_diagnosis_without_a_drive_says_why_and_prints_the_command_that_looks_for_one(
+    straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec, _ = straight
+    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
+    case = load(spec)
+    monkeypatch.setattr(next_drive, "LIMIT_S", 0.0)
+    late = next_drive.next_drive(case, found)
+    assert late is not None
+    assert (late.legs, late.minutes, late.reached) == ((), None, False)
+    *words, asked, rivals = shlex.split(late.command)
+    assert words == ["syncline-design", "plan", str(spec), "--separate"]
+    assert asked.startswith("latency(position)=30")
+    assert "lever_arm(position)" in rivals.split(", ")
+    words = render_diagnose("markdown", replace(found, plan=late)).replace("\\", "")
+    assert "No drive that does was found in the time" in words
+    assert late.command in words
+    jsonschema.validate(replace(found, plan=late).to_json(), result_schema("diagnosis"))
+
+
+def test_a_drive_of_more_than_some_hours_is_none_and_no_manoeuvre_is_promised(
+    straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
+    arm = next(r for r in whole.findings[0].aliases if r.effect == "lever_arm")
+    found = replace(whole, findings=(replace(whole.findings[0], aliases=(arm,)),))
+    monkeypatch.setattr(next_drive, "LIMIT_S", 600.0)  # however busy the machine is
+    monkeypatch.setattr(next_drive, "LONGEST_S", 1.0)
+    drive = next_drive.next_drive(load(straight[0]), found)
+    assert drive is not None
+    assert (drive.minutes, drive.legs) == (None, ())
+    assert drive.why_none is not None
+    assert drive.why_none.startswith("No test drive of this platform of up to 1 s was found")
+    words = render_diagnose("markdown", replace(found, plan=drive)).replace("\\", "")
+    assert "It takes" not in words
+    assert "To separate them" not in words
+    assert "No drive that does was found." in words
+
+
+def test_a_class_that_no_drive_tells_is_said_to_be_one(
+    straight: tuple[Path, Path], diagnosed: Path
+) -> None:
+    """Two lever arms of one rigid body shift every row alike, whatever is driven."""
+    spec, _ = straight
+    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
+    arms = ("lever_arm", "position"), ("lever_arm", "ranging")
+    one, other = (
+        replace(r, effect=effect, sensor=sensor)
+        for (effect, sensor), r in zip(arms, [found.findings[0].aliases[0]] * 2, strict=True)
+    )
+    alone = replace(found.findings[0], effect=one.effect, sensor=one.sensor, aliases=(other,))
+    ends = next_drive.next_drive(load(spec), replace(found, findings=(alone,)))
+    assert ends is not None
+    assert ends.why_none is not None
+    assert "lever_arm(position) from lever_arm(ranging)" in ends.why_none
+    assert ends.legs == ()

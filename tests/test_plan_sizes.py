@@ -1,0 +1,105 @@
+"""Effects whose size is known: what tells them apart beyond first order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import syncline_design as sd
+from syncline_design.planning.telling import PlanRun
+from tests.planned_specs import SPEC, call, world
+from tests.world.hidden import hidden
+from tests.world.worldlog import make_log
+
+LARGE_S = 0.3
+
+
+LATENCY, LAG = "latency(position)", "filter_lag(position)"
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("plan") / "copter.yaml"
+    path.write_text(SPEC, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def sized(spec: Path) -> PlanRun:
+    return sd.plan(spec, separate=(f"{LATENCY}={LARGE_S} s", LAG))
+
+
+def test_a_large_latency_is_told_from_a_filter_lag_that_a_small_one_is_like(
+    spec: Path, sized: PlanRun
+) -> None:
+    """To first order both shift by -T v.  Of a known size they are judged as they are."""
+    assert sized.result.reached
+    assert sized.result.sized
+    assert sized.result.inseparable == ()
+    first = call(spec, "--separate", LATENCY, LAG)
+    small = call(spec, "--separate", f"{LATENCY}=2 ms", LAG)
+    for done, words in (
+        (first, "apart, as far as their effects of first order go"),
+        (small, "apart, at the size that is known, in these minutes"),
+    ):
+        assert done.exit_code == 1
+        assert f"No drive of this platform tells {LATENCY} and {LAG} {words}" in " ".join(
+            done.stdout.split()
+        )
+
+
+def test_by_how_much_a_latency_beats_a_lag_is_what_the_world_says(sized: PlanRun) -> None:
+    """The errors of both by a simulator of its own, with the same noise, weighted by the scatter of
+    its own draws, row by row; the lag nearest to the latency by looking."""
+    run, draws = world(sized), 200
+    clean = make_log(run).error()
+    scattered = np.array([make_log(replace(run, seed=k)).error() for k in range(draws)])
+    scattered -= scattered.mean(axis=0)
+    covariance = np.einsum("kri,krj->rij", scattered, scattered) / (draws - 1)
+    weight = np.linalg.inv(covariance) * (draws - 5) / (draws - 1)  # mean of an inverse Wishart
+    late = make_log(run, (hidden("latency", "position", latency_s=LARGE_S),)).error() - clean
+    found = []
+    for constant in np.linspace(0.2, 0.4, 41):
+        lag = hidden("filter_lag", "position", time_constant_s=float(constant))
+        apart = late - (make_log(run, (lag,)).error() - clean)
+        found.append(float(np.einsum("ri,rij,rj->", apart, weight, apart)))
+    (pair,) = sized.result.pairs
+    assert pair.noncentrality == pytest.approx(min(found), rel=0.15)
+    assert min(found) < 0.5 * max(found)
+
+
+def test_a_class_is_told_at_once_and_what_no_drive_tells_is_left_out(spec: Path) -> None:
+    """Several rivals in one plan: each with its figures."""
+    rivals = "lever_arm(position), datum_offset(target)"
+    found = sd.plan(spec, separate=(f"{LATENCY}=20 ms", rivals)).result
+    assert found.reached
+    assert [pair.second for pair in found.pairs] == ["lever_arm(position)", "datum_offset(target)"]
+    assert all(pair.separated and pair.sizes == {"latency_s": 0.02} for pair in found.pairs)
+
+
+@pytest.mark.parametrize(
+    ("first", "words"),
+    [
+        (f"{LATENCY}=5 m", "latency_s is no such quantity"),
+        (f"{LATENCY}=0 s", "expected a size other than 0"),
+        (f"{LATENCY}=[1 s, 2 s]", "expected 1 size, of latency_s; found 2"),
+        ("lever_arm(position)=1 cm", "expected 3 sizes, of x_m, y_m, z_m; found 1"),
+        (f"{LATENCY}=", "latency_s is no such quantity"),
+    ],
+)
+def test_sizes_that_are_none_are_refused(spec: Path, first: str, words: str) -> None:
+    done = call(spec, "--separate", first, LAG)
+    assert done.exit_code == 2
+    assert words in done.stderr
+
+
+def test_doubles_are_said_to_be_doubles(spec: Path) -> None:
+    """Only R (l_L - l_G) is in the error at equal stamps: no drive tells the two lever arms."""
+    done = call(spec, "--separate", "lever_arm(position)", "lever_arm(ranging)")
+    assert done.exit_code == 1
+    assert "No drive of this platform tells lever_arm(position) and lever_arm(ranging)" in " ".join(
+        done.stdout.split()
+    )
