@@ -13,6 +13,15 @@ from syncline_design.comparison.meaning import (
     ErrorFigure,
     Summary,
 )
+from syncline_design.diagnosis.gap_result import (
+    Fit,
+    Gap,
+    HeldOut,
+    Regime,
+    Remaining,
+    Saved,
+    WholeGap,
+)
 from syncline_design.diagnosis.plotted import (
     AxisResiduals,
     CovariateMap,
@@ -25,19 +34,12 @@ from syncline_design.diagnosis.result import (
     DiagnosisProvenance,
     Estimate,
     Finding,
-    Fit,
-    Gap,
-    HeldOut,
     Likelihoods,
     LogRead,
     MotionQuantiles,
     Noise,
-    Regime,
-    Remaining,
     Rival,
-    Saved,
     SpecRead,
-    WholeGap,
 )
 
 GOOD = Fit(rms_m=0.021, reduced_chi2=1.02, nll_per_sample=-4.1, coverage_95=0.949)

@@ -21,7 +21,7 @@ from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 from syncline_design.diagnosis.checks import Check, log_checks
 from syncline_design.diagnosis.covariance import inverse_3x3
 from syncline_design.diagnosis.gap import closed_share
-from syncline_design.diagnosis.result import Fit, Gap, HeldOut
+from syncline_design.diagnosis.gap_result import Fit, Gap, HeldOut
 from syncline_design.diagnosis.scatter import scatter
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured

@@ -16,6 +16,7 @@ from html_page import Page
 from syncline_design.comparison.meaning import DiagnosisAndDesign, ErrorFigure
 from syncline_design.comparison.repairs import Repair, RepairStep
 from syncline_design.diagnosis.findings import estimate, finding
+from syncline_design.diagnosis.gap_result import WholeGap
 from syncline_design.diagnosis.result import (
     Estimate,
     Joint,
@@ -23,7 +24,6 @@ from syncline_design.diagnosis.result import (
     NextDrive,
     PerLog,
     Rival,
-    WholeGap,
 )
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts

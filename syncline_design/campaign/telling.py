@@ -16,6 +16,7 @@ from syncline_design.campaign.store import Entry, Stored
 from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import Weights, promise_of
 from syncline_design.diagnosis.findings import estimate, evidence_words, finding
+from syncline_design.diagnosis.gap_result import Remaining, WholeGap
 from syncline_design.diagnosis.plotted import (
     Plots,
     Residuals,
@@ -31,10 +32,8 @@ from syncline_design.diagnosis.result import (
     LogRead,
     Noise,
     PerLog,
-    Remaining,
     Rival,
     SpecRead,
-    WholeGap,
 )
 from syncline_design.diagnosis.run import provenance_of
 from syncline_design.diagnosis.same_system import description

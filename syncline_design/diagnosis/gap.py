@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.fitting import Data, Model, inner, solve_scaled
+from syncline_design.diagnosis.gap_result import Fit, Gap, HeldOut, Saved
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
     as_specified,
@@ -20,7 +21,6 @@ from syncline_design.diagnosis.noise import (
     spec_bounds,
 )
 from syncline_design.diagnosis.regimes import covariates
-from syncline_design.diagnosis.result import Fit, Gap, HeldOut, Saved
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits

@@ -9,8 +9,8 @@ import numpy as np
 
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.gap import block_folds, gap, regime_fold
+from syncline_design.diagnosis.gap_result import Gap, WholeGap
 from syncline_design.diagnosis.gross import Gross
-from syncline_design.diagnosis.result import Gap, WholeGap
 from syncline_design.diagnosis.search import Search, SearchResult
 from syncline_design.effects.record import Array
 

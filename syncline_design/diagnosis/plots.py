@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from syncline_design.diagnosis.fitting import Data
+from syncline_design.diagnosis.gap_result import Regime
 from syncline_design.diagnosis.noise import marginal_variance
 from syncline_design.diagnosis.plotted import (
     AxisResiduals,
@@ -20,9 +21,6 @@ from syncline_design.diagnosis.remainder_plots import (
     normal_of,
     spectrum_of,
     track_of,
-)
-from syncline_design.diagnosis.result import (
-    Regime,
 )
 from syncline_design.diagnosis.search import SearchResult
 from syncline_design.effects.record import Array

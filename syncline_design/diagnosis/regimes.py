@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.fitting import inner, inverse_scaled
-from syncline_design.diagnosis.result import Regime
+from syncline_design.diagnosis.gap_result import Regime
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array

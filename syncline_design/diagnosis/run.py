@@ -26,6 +26,7 @@ from syncline_design.diagnosis.findings import (
     with_unlike_readings,
 )
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
+from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
@@ -54,8 +55,6 @@ from syncline_design.diagnosis.result import (
     LogRead,
     MotionQuantiles,
     Noise,
-    Regime,
-    Remaining,
     SlowNoise,
     SpecRead,
 )

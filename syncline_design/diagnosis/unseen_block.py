@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from syncline_design.diagnosis.fitting import WINDOW, Data, windows
 from syncline_design.diagnosis.gap import PURGE_S, PURGE_SHARE, Held, closed_share
+from syncline_design.diagnosis.gap_result import HeldOut, UnseenBlock
 from syncline_design.diagnosis.noise import clipped, spec_bounds
-from syncline_design.diagnosis.result import HeldOut, UnseenBlock
 from syncline_design.diagnosis.search import Search, SearchResult
 from syncline_design.logs.log import Log
 

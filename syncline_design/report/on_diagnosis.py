@@ -7,16 +7,14 @@ from functools import partial
 from typing import Final
 
 from syncline_design.comparison.meaning import DesignMeaning, DiagnosisAndDesign
+from syncline_design.diagnosis.gap_result import Gap, Regime, Remaining
 from syncline_design.diagnosis.identify import SAME
 from syncline_design.diagnosis.result import (
     Diagnosis,
     Estimate,
     Finding,
-    Gap,
     LogRead,
     NextDrive,
-    Regime,
-    Remaining,
     Rival,
     Stretch,
     readings_words,

@@ -6,17 +6,11 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
+from syncline_design.diagnosis.gap_result import Fit, Gap, HeldOut, UnseenBlock, WholeGap
 from syncline_design.diagnosis.plotted import (
     Plots,
 )
-from syncline_design.diagnosis.result import (
-    Diagnosis,
-    Fit,
-    Gap,
-    HeldOut,
-    UnseenBlock,
-    WholeGap,
-)
+from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import numbers
