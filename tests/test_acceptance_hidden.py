@@ -12,11 +12,11 @@ from scipy.stats import chi2
 
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.consequence import promise_of
+from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.result import (
     Smallest,
 )
 from syncline_design.diagnosis.sight import _both, left_within
-from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.load import load
 from syncline_design.verdict.verify import CheckSettings, check_loaded

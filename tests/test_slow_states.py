@@ -17,6 +17,7 @@ from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.diagnosis.candidates import candidates, directed_parts, signatures
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import Data, data_of, fit
+from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.noise import (
     _Packing,
     as_specified,
@@ -29,7 +30,7 @@ from syncline_design.diagnosis.noise import (
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.run import outcome
 from syncline_design.diagnosis.scene import scene
-from syncline_design.diagnosis.slow_states import Judged, slow_states
+from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.system import measured
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.spec.load import load

@@ -21,9 +21,9 @@ from scipy.stats import chi2
 
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.result import Scope
 from syncline_design.diagnosis.scores import log_p_of
-from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 

@@ -17,6 +17,7 @@ from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import Weights, promise_of
 from syncline_design.diagnosis.findings import estimate, evidence_words, finding
 from syncline_design.diagnosis.gap_result import Remaining, WholeGap
+from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.plotted import (
     Plots,
     Residuals,
@@ -39,7 +40,6 @@ from syncline_design.diagnosis.run import provenance_of
 from syncline_design.diagnosis.same_system import description
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.diagnosis.sight import DetectionLimit, alone, informative
-from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array

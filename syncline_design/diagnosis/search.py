@@ -26,6 +26,7 @@ from syncline_design.diagnosis.candidates import (
 )
 from syncline_design.diagnosis.episodes import Episode, episode_effect, episodes, with_episodes
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
+from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
@@ -33,7 +34,7 @@ from syncline_design.diagnosis.pairs import promising, standing, with_pair
 from syncline_design.diagnosis.parts import NATS, STRETCHES, cut_down, in_a_part, refined
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settling import Settled, borne_out, settle, weaker_judged
-from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, slow_states
+from syncline_design.diagnosis.slow_states import States, fitted_of, slow_states
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import (

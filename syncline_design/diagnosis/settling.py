@@ -14,9 +14,10 @@ from syncline_design.diagnosis.charges import told_nats
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.identify import Comparison, competed
 from syncline_design.diagnosis.identity import Label, effect_of, without
+from syncline_design.diagnosis.judged import Course, Judged
 from syncline_design.diagnosis.noise import as_specified
 from syncline_design.diagnosis.one_value import Uneven, uneven_effects
-from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted_of, names_of
+from syncline_design.diagnosis.slow_states import States, fitted_of, names_of
 from syncline_design.diagnosis.step_form import refuted_steps
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance, seen_in_motion

@@ -10,10 +10,10 @@ from scipy.stats import chi2, f, t
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, hidden_by_noise, zero_values
 from syncline_design.diagnosis.consequence import SpecPromise, blind_spots
+from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.positive import pseudo_inverse
 from syncline_design.diagnosis.result import BlindSpot, Informative, Smallest
 from syncline_design.diagnosis.search import Search, SearchResult
-from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.known import EffectEntry

@@ -22,27 +22,25 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve
-from scipy.special import betainc, gammaincc
-from scipy.stats import t
 
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled
+from syncline_design.diagnosis.judged import Course, Judged, course_of
 from syncline_design.diagnosis.noise import NoiseLevel, SensorKey, white_covariance
 from syncline_design.diagnosis.positive import inverse as inverse_of
-from syncline_design.diagnosis.positive import pseudo_inverse, solution
+from syncline_design.diagnosis.positive import solution
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.normal import NORMAL_95, OF_MEDIAN_DEVIATION
+from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 
 Channel = tuple[SensorKey, int]
 SURVEY: SensorKey = ("", "target")  # channel of the targets' survey errors
 WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
 INSIDE = 12  # blocks of a part of the log in which an effect acts alone
-QUARTERS = 4
 FEW = 8, 64  # targets, to be left out one group after the other
 LEAST_BLOCKS = 5
 LEAST_ROWS = 8  # of a block
@@ -58,106 +56,9 @@ STEADY = 1e-2  # of the model's variance: blocks of an axis without noise agree 
 LOST = 1e-7  # share of a column's information below which others hold it all
 RIDGE = 1e-9  # of scaled columns that hold one another
 SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
-LEAST_LOG_P = -700.0
 # Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
 KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
 KIN_SPREAD = 1.0  # standard deviation in log variance by which they differ
-
-
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """Parameters of one group of columns as these states see them.
-
-    values: what they are by the states.  model: their covariance by the states.  jackknives:
-    covariance by leaving out one part of the log after the other, and the number of parts: of
-    stretches of time, and of targets where they are few.  No variance of what is not seen at all.
-    """
-
-    values: Array
-    model: Array
-    jackknives: tuple[tuple[Array, int], ...] = ()
-
-    @property
-    def spread(self) -> Array:
-        """Standard uncertainty, the largest of all."""
-        variance = np.diag(self.model)
-        for covariance, _ in self.jackknives:
-            variance = np.maximum(variance, np.diag(covariance))
-        return np.sqrt(np.maximum(variance, 0.0))
-
-    @property
-    def coverage(self) -> float:
-        """Standard uncertainties that a 95 % interval spans to either side."""
-        counts = [count for _, count in self.jackknives]
-        return float(t.isf(0.025, min(counts) - 1)) if counts else NORMAL_95
-
-    @property
-    def model_log_p(self) -> float:
-        """log of the chance that these states alone make values at least as large."""
-        seen = np.diag(self.model) > 0.0
-        size = int(np.sum(seen))
-        if size == 0:
-            return 0.0
-        return _log_chi2(_square(self.values[seen], self.model[seen][:, seen]), size)
-
-    @property
-    def log_p(self) -> float:
-        """log of the chance that noise alone makes values at least as large, the largest."""
-        seen = np.diag(self.model) > 0.0
-        size = int(np.sum(seen))
-        if size == 0:
-            return 0.0
-        values = self.values[seen]
-        found = self.model_log_p
-        for covariance, count in self.jackknives:
-            own = count - size
-            share = _square(values, covariance[seen][:, seen]) * own / (size * (count - 1))
-            found = max(found, _log_f(share, size, own))
-        return found
-
-
-def _log_chi2(square: float, freedom: int) -> float:
-    """log of the upper tail of chi-square."""
-    return _log(float(gammaincc(0.5 * freedom, 0.5 * square)))
-
-
-def _log_f(share: float, first: int, second: int) -> float:
-    """log of the upper tail of Fisher's F, by the incomplete beta function."""
-    return _log(float(betainc(0.5 * second, 0.5 * first, second / (second + first * share))))
-
-
-def _log(chance: float) -> float:
-    return math.log(chance) if chance > 0.0 else LEAST_LOG_P
-
-
-def _square(values: Array, covariance: Array) -> float:
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    inverse = pseudo_inverse(covariance / scale[:, None] / scale, 1e-10)
-    scaled = values / scale
-    return float(scaled @ inverse @ scaled)
-
-
-@dataclass(frozen=True, slots=True)
-class Course:
-    """A parameter in the quarters of a log: values, and the log of the chance that it is one."""
-
-    values: tuple[float, ...]
-    log_p: float
-
-
-def _course(own: Array, weight: Array) -> Course:
-    """Weighted one-way analysis of variance of the blocks' values over QUARTERS of the blocks."""
-    groups = np.arange(own.shape[0]) * QUARTERS // own.shape[0]
-    total = np.array([np.sum(weight[groups == q]) for q in range(QUARTERS)])
-    if np.any(total <= 0.0):
-        return Course((), 0.0)
-    parts = [np.sum((weight * own)[groups == q]) / total[q] for q in range(QUARTERS)]
-    means = np.array(parts)
-    whole = float(np.sum(total * means) / np.sum(total))
-    between = float(np.sum(total * (means - whole) ** 2)) / (QUARTERS - 1)
-    inside = float(np.sum(weight * (own - means[groups]) ** 2)) / (own.shape[0] - QUARTERS)
-    log_p = _log_f(between / max(inside, 1e-300), QUARTERS - 1, own.shape[0] - QUARTERS)
-    return Course(tuple(float(v) for v in means), log_p)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +158,7 @@ class States:
             weight = sums.normal[:, at, at]
             whole = float(one.values[names[0]]) + values[at] / scale[at] if names else 0.0
             own = whole + left[:, at] / np.where(weight > 0.0, weight, 1.0) if names else weight
-            found.append(_course(own, weight) if len(names) == 1 else None)
+            found.append(course_of(own, weight) if len(names) == 1 else None)
             at += len(names_of(one))
         return found
 
