@@ -20,13 +20,8 @@ from syncline_design.diagnosis.charges import UNUSUAL_NATS, Charge
 from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import data_of, fit
-from syncline_design.diagnosis.noise import (
-    as_specified,
-    first_guess,
-    fit_noise,
-    precision,
-    spec_bounds,
-)
+from syncline_design.diagnosis.noise import as_specified, first_guess, precision, spec_bounds
+from syncline_design.diagnosis.noise_fit import fit_noise
 from syncline_design.diagnosis.scene import Scene, acting, scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.spec.load import load

@@ -16,11 +16,11 @@ from syncline_design.diagnosis.noise import (
     Structure,
     White,
     first_guess,
-    fit_noise,
     marginal_variance,
     precision,
     spec_bounds,
 )
+from syncline_design.diagnosis.noise_fit import fit_noise
 from syncline_design.diagnosis.noise_slopes import _blocks
 from syncline_design.diagnosis.scene import acting
 from syncline_design.diagnosis.scores import Gram, clean_threshold, log_p_of

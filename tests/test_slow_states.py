@@ -18,15 +18,8 @@ from syncline_design.diagnosis.candidates import candidates, directed_parts, sig
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import Data, data_of, fit
 from syncline_design.diagnosis.judged import Judged
-from syncline_design.diagnosis.noise import (
-    _Packing,
-    as_specified,
-    first_guess,
-    mean_share,
-    mean_share_slope,
-    precision,
-    spec_bounds,
-)
+from syncline_design.diagnosis.noise import as_specified, first_guess, precision, spec_bounds
+from syncline_design.diagnosis.noise_fit import Packing, mean_share, mean_share_slope
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.run import outcome
 from syncline_design.diagnosis.scene import scene
@@ -136,7 +129,7 @@ def test_slopes_of_the_noise_are_those_of_differences(shared: bool, tmp_path: Pa
         structure = replace(structure, slow=tight)
     sizes = tuple(range(len(structure.directed)))[:2]
     bounds = replace(spec_bounds(structure), factor=(9.0,) * len(structure.white))
-    packing = _Packing(structure, bounds, sizes)
+    packing = Packing(structure, bounds, sizes)
     guess = first_guess(structure)
     level = replace(
         guess,

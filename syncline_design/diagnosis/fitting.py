@@ -21,10 +21,10 @@ from syncline_design.diagnosis.noise import (
     NoiseLevel,
     Structure,
     first_guess,
-    fit_noise,
     precision,
     spec_bounds,
 )
+from syncline_design.diagnosis.noise_fit import fit_noise
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array

@@ -21,7 +21,8 @@ from typing import Final
 import numpy as np
 from scipy.stats import t
 
-from syncline_design.diagnosis.noise import FACTOR_LEAST, FACTOR_LIMIT, OPEN, SensorKey
+from syncline_design.diagnosis.noise import FACTOR_LIMIT, OPEN, SensorKey
+from syncline_design.diagnosis.noise_fit import FACTOR_LEAST
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 

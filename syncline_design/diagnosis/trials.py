@@ -30,13 +30,8 @@ from syncline_design.diagnosis.fitting import (
     inverse_scaled,
 )
 from syncline_design.diagnosis.motion_scatter import grows_with_motion
-from syncline_design.diagnosis.noise import (
-    TIME_LEAST_S,
-    TIME_LEAST_STAMPS,
-    NoiseLevel,
-    precision,
-    with_size,
-)
+from syncline_design.diagnosis.noise import NoiseLevel, precision, with_size
+from syncline_design.diagnosis.noise_fit import TIME_LEAST_S, TIME_LEAST_STAMPS
 from syncline_design.diagnosis.parts import STRETCHES
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.diagnosis.spans import span_of

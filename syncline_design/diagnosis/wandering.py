@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.fitting import SHORT, Data, Model
 from syncline_design.diagnosis.identity import Label
-from syncline_design.diagnosis.noise import OPEN, Bounds, Slow, fit_noise, white_covariance
+from syncline_design.diagnosis.noise import OPEN, Bounds, Slow, white_covariance
+from syncline_design.diagnosis.noise_fit import fit_noise
 from syncline_design.diagnosis.slow_states import names_of
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.record import Array
