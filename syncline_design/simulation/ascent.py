@@ -17,13 +17,14 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 
-_STEP = 1e-6  # of the forward differences, in units of each block
+_STEP = 1e-6  # in units of each block: of forward differences, and to weigh a slope
 _MOVES = (1.0, 0.5, 0.2, 0.05, 0.01, 0.002)  # fractions of the way to the ascent direction
 _STRIDES = (1.0, 3.0, 10.0, 30.0)  # multiples of the last step to go on by: climbs along ridges
 SYSTEM = -1  # the stage number of blocks that all stages share
 RegionKind = Literal["ball", "sphere"]
 Index = NDArray[np.intp]
 Objective = Callable[[Array, Index], Array]  # points (p, n), problem of each (n,) -> values (n,)
+Slopes = Callable[[Array, Index], Array]  # the same -> slopes by the points (p, n)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,10 +72,14 @@ def chosen(blocks: tuple[FreeVector, ...], point: Array, stage: int) -> dict[str
 
 @dataclass(frozen=True, slots=True)
 class Ascent:
-    """Climbs an objective over blocks from many points at once."""
+    """Climbs an objective over blocks from many points at once.
+
+    slopes: its own; None: by forward differences.
+    """
 
     blocks: tuple[FreeVector, ...]
     objective: Objective
+    slopes: Slopes | None = None
 
     def ascend(
         self, point: Array, of: Index, enough: Array, settled: float, iterations: int
@@ -130,11 +135,7 @@ class Ascent:
         For a convex objective moving a block there never lowers it (Journee et al., J. Mach.
         Learn. Res. 11 (2010) 517-553, the generalised power method).
         """
-        size, columns = point.shape
-        shifted = np.repeat(point[:, None, :], size, axis=1)
-        shifted[np.arange(size), np.arange(size)] += _STEP
-        found = self.objective(shifted.reshape(size, -1), np.tile(of, size))
-        slope = found.reshape(size, columns) - value
+        slope = self._gain(point, value, of)
         target = point.copy()
         for block in self.blocks:
             length = np.sqrt(np.sum(slope[block.rows] ** 2, axis=0))
@@ -142,3 +143,13 @@ class Ascent:
             scaled = slope[block.rows] / np.where(felt, length, 1.0)
             target[block.rows] = np.where(felt, scaled, point[block.rows])
         return target
+
+    def _gain(self, point: Array, value: Array, of: Index) -> Array:
+        """What a small step along each element gains (p, n)."""
+        if self.slopes is not None:
+            return _STEP * self.slopes(point, of)
+        size, columns = point.shape
+        shifted = np.repeat(point[:, None, :], size, axis=1)
+        shifted[np.arange(size), np.arange(size)] += _STEP
+        found = self.objective(shifted.reshape(size, -1), np.tile(of, size))
+        return found.reshape(size, columns) - value

@@ -21,8 +21,9 @@ from syncline_design.simulation.ascent import chosen
 from syncline_design.simulation.draws import ranging_shares
 from syncline_design.simulation.figures import StageSituation, stage_situations
 from syncline_design.simulation.lattice import MANY_POINTS, POINTS
-from syncline_design.simulation.situations import Moments, Situations, bearings, ranges_m
-from syncline_design.simulation.statistical import averaged, columns_at
+from syncline_design.simulation.propagation import averaged, columns_at
+from syncline_design.simulation.sights import bearings, ranges_m
+from syncline_design.simulation.situations import Moments, Situations
 from syncline_design.simulation.timing_variables import SystemTiming
 
 Displacement = tuple[float, float, float]  # north, east, down

@@ -18,12 +18,13 @@ from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.ascent import SYSTEM, chosen
 from syncline_design.simulation.certified import certified_worst_case_m
 from syncline_design.simulation.lattice import POINTS
-from syncline_design.simulation.situations import Situations, bearings, ranges_m
+from syncline_design.simulation.propagation import columns_at
+from syncline_design.simulation.sights import bearings, ranges_m
+from syncline_design.simulation.situations import Situations
 from syncline_design.simulation.statistical import (
     AXES,
     Wanted,
     Worst,
-    columns_at,
     statistical_figures,
 )
 from syncline_design.simulation.surroundings import leaning, moment_at

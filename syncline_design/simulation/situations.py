@@ -7,12 +7,13 @@ and looks, when and where it is, and, where one mission is asked for, what is co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from syncline_design.effects.acting import by_stage
-from syncline_design.effects.record import Array, StageRows
+from syncline_design.effects.record import Array, Departures, StageRows
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.random_numbers import generator
 from syncline_design.model.lever_arms import position_lever_arm
@@ -24,12 +25,13 @@ from syncline_design.simulation import kernel
 from syncline_design.simulation.ascent import (
     SYSTEM,
     FreeVector,
+    Index,
     RegionKind,
     at_length_one,
     chosen,
     stacked,
 )
-from syncline_design.simulation.chain import SensorSigma, noise_slopes
+from syncline_design.simulation.chain import ChainNoise, ConstantTwist, SensorSigma, noise_slopes
 from syncline_design.simulation.drawn_effects import (
     STEP,
     Drawn,
@@ -42,13 +44,21 @@ from syncline_design.simulation.draws import (
     TimeShifts,
     lever_arms,
     ranging_shares,
-    sight,
     stage_shifts,
 )
 from syncline_design.simulation.known_effects import Carried, departed_error
 from syncline_design.simulation.lattice import lattice
+from syncline_design.simulation.sights import bearings, ranges_m, reach_m, sights
 from syncline_design.simulation.surroundings import leaning, moment_at, placed_rows
 from syncline_design.simulation.timing_variables import SystemTiming, timing_of
+from syncline_design.simulation.undisturbed import (
+    StageRun,
+    relative_shifts,
+    stage_run,
+    state_of,
+    sum_of_errors,
+)
+from syncline_design.simulation.undisturbed_slopes import pulled
 
 SITUATION_STREAM = 4  # first word of the stream key, see draws.generator
 _LINEAR_RAD = 0.05  # turns during a shift up to which propagation is right within 0.2 %
@@ -70,6 +80,35 @@ class Moments:
         return found
 
 
+def moments_of(runs: Sequence[StageRun]) -> Moments:
+    """Of a system without effects: the errors of its stages added, their slopes side by side."""
+    slopes = np.concatenate([run.slopes() for run in runs], axis=1)
+    mean = np.moveaxis(sum_of_errors(runs), 0, -1)
+    return Moments(mean, np.transpose(slopes, (2, 3, 0, 1)))
+
+
+@dataclass(frozen=True, slots=True)
+class Pulls:
+    """Slopes of a figure by the errors (3, n, M) and by their slopes (3, c, n, m) at m nodes."""
+
+    on_error: Array
+    on_slopes: Array
+
+
+Rows = TypeVar("Rows", StageRows, ConstantTwist, ChainNoise, Departures)
+
+
+def taken(record: Rows, rows: Index) -> Rows:
+    """Some rows of a record whose arrays have one each, or one for all."""
+    values = {one.name: getattr(record, one.name) for one in fields(record)}
+    many: dict[str, Any] = {
+        name: value[rows]
+        for name, value in values.items()
+        if isinstance(value, np.ndarray) and value.shape[0] > 1
+    }
+    return replace(record, **many)
+
+
 class Situations:
     """What may be chosen of a system, and its error there."""
 
@@ -84,6 +123,9 @@ class Situations:
         self.drawn: tuple[Drawn, ...] = ()
         if self.acting:
             self.drawn = self._numbers_drawn()
+        else:
+            places = range(len(system.stages))
+            self.shifts = [relative_shifts(system, self.timing, k) for k in places]
 
     def _numbers_drawn(self) -> tuple[Drawn, ...]:
         """What the effects that scatter draw for each sample."""
@@ -110,22 +152,58 @@ class Situations:
 
     def errors_m(self, point: Array, nodes: Array) -> Array:
         """The error without noise of sensors at points (p, n), each at all nodes: (n, M, 3)."""
-        return self._run(point, nodes, None)
+        if self.acting:
+            return self._run(point, nodes, None)
+        return np.moveaxis(sum_of_errors(self.runs(point, nodes, slice(0))), 0, -1)
 
-    def moments(self, point: Array, nodes: Array) -> Moments:
-        """The error at points (p, n), each at all nodes (dimensions, M)."""
+    def moments(self, point: Array, nodes: Array, slopes_at: int | None = None) -> Moments:
+        """The error at points (p, n), each at all nodes (dimensions, M).
+
+        slopes_at: how many of the nodes, from the first, have to have slopes; None: all.
+        """
+        if not self.acting:
+            return moments_of(self.runs(point, nodes, slice(slopes_at)))
         slopes: list[Array] = []
-        mean = self._run(point, nodes, slopes)
-        return Moments(mean, np.concatenate(slopes, axis=2).reshape(*mean.shape, -1))
+        rows = np.arange(point.shape[1] * nodes.shape[1]).reshape(point.shape[1], -1)
+        wanted = rows[:, :slopes_at]
+        mean = self._run(point, nodes, (slopes, wanted.ravel()))
+        found = np.concatenate(slopes, axis=2)
+        return Moments(mean, found.reshape(*wanted.shape, *found.shape[1:]))
+
+    def runs(self, point: Array, nodes: Array, slopes_at: slice) -> tuple[StageRun, ...]:
+        """Every stage of a system without effects at points (p, n), each at all nodes."""
+        values = self._values(point[:, :, None], nodes[:, None, :])
+        return tuple(
+            stage_run(state_of(self.system, self.blocks, index, point), at.at(values), slopes_at)
+            for index, at in enumerate(self.shifts)
+        )
+
+    def slopes(self, point: Array, runs: Sequence[StageRun], pulls: Pulls) -> Array:
+        """Slopes (p, n) of a figure at points, from those by its errors and their slopes."""
+        found = np.zeros(point.shape)
+        held = np.flatnonzero(self.held)
+        by_value = np.zeros((len(self.held), point.shape[1]))
+        for index, (run, shifts) in enumerate(zip(runs, self.shifts, strict=True)):
+            mine = slice(9 * index, 9 * index + 9)
+            pull = pulled(run, pulls.on_error, pulls.on_slopes[:, mine], self.system.horizon)
+            for block in self.blocks:
+                if block.stage == index:
+                    found[block.rows] = pull.blocks[block.name]
+            by_value += shifts.signs.T @ pull.on_shifts
+        for k, block in zip(held, self.blocks, strict=False):  # they come first
+            low, high = self.timing.variables[k].ends_s(self.system.coverage_factor)
+            found[block.rows] = 0.5 * (high - low) * by_value[k]
+        return found
 
     def _run(
         self,
         point: Array,
         nodes: Array,
-        slopes: list[Array] | None,
+        slopes: tuple[list[Array], Index] | None,
         drawn: list[Drawn] | None = None,
     ) -> Array:
-        """The chain at all nodes of all points; the slopes of its stages are added to `slopes`.
+        """The chain at all nodes of all points; the slopes of its stages are added to `slopes`, at
+        the rows named there.
 
         drawn: takes up what the effects that scatter draw, which then stay at their medians.
         """
@@ -152,14 +230,19 @@ class Situations:
             world = departed(self.acting, stage.name, state, shares)
             carried = departed_error(rows, world, carried)
             if slopes is not None:
-                slopes.append(noise_slopes(state, motion, noise, world, _sigma(stage, state)))
-                slopes += wandering(self.acting, stage.name, state)
+                added, at = slopes
+                few = taken(state, at)
+                rest = taken(motion, at), taken(noise, at), taken(world, at)
+                added.append(noise_slopes(few, *rest, _sigma(stage, few)))
+                added += wandering(self.acting, stage.name, few)
         assert carried is not None
         return carried.error_m.T.reshape(count, each, 3)
 
     def _values(self, columns: Array, nodes: Array) -> Array:
-        """Values [s] of all variables (variables, n): nodes of the free, ends of the held."""
-        values = np.empty((len(self.held), columns.shape[1]))
+        """Values [s] of all variables (variables, ...): nodes of the free, ends of the held."""
+        values = np.empty(
+            (len(self.held), *np.broadcast_shapes(columns.shape[1:], nodes.shape[1:]))
+        )
         values[list(self.free)] = nodes
         k = self.system.coverage_factor
         about = chosen(self.blocks, columns, SYSTEM)
@@ -182,6 +265,14 @@ class Situations:
         last = len(self.system.stages) - 1
         picked = chosen(self.blocks, point, last)
         return ranges_m(self.system.stages[last], picked, point.shape[1])
+
+    def last_range_slopes_m(self) -> Array:
+        """How it follows what is chosen [m] (p,)."""
+        last, slopes = len(self.system.stages) - 1, np.zeros(self.size)
+        for block in self.blocks:
+            if (block.stage, block.name) == (last, "distance"):
+                slopes[block.rows] = reach_m(self.system.stages[last])
+        return slopes
 
     def steps(self) -> Array:
         """(dimensions, 1 + dimensions): at their means, then each one deviation off."""
@@ -260,38 +351,6 @@ def _draw(
 def _bending(picked: dict[str, Array], name: str) -> Array | None:
     """Unit vectors (n, 3) along which a path bends between samples, where one is interpolated."""
     return picked[name].T if name in picked else None
-
-
-def sights(index: int, stage: Stage) -> list[tuple[int, str, RegionKind, int]]:
-    """Blocks of a line of sight: any direction, or the height and azimuth of a `look`."""
-    if stage.look is None:
-        return [(index, "bearing", "sphere", 3)]
-    around: tuple[int, str, RegionKind, int] = (index, "azimuth", "sphere", 2)
-    if stage.look.azimuth is not None:
-        around = (index, "azimuth", "ball", 1)
-    return [around, (index, "elevation", "ball", 1)]
-
-
-def bearings(stage: Stage, picked: dict[str, Array], count: int) -> Array:
-    """Line of sight in the body's axes, (3, count)."""
-    if stage.look is None:
-        return np.broadcast_to(picked["bearing"], (3, count))
-    at = picked["azimuth"]
-    if stage.look.azimuth is None:
-        across = 0.5 + np.arctan2(at[1], at[0]) / (2.0 * np.pi)
-    else:
-        across = 0.5 * (at[0] + 1.0)
-    return sight(stage.look, across, 0.5 * (picked["elevation"][0] + 1.0))
-
-
-def ranges_m(stage: Stage, picked: dict[str, Array], count: int) -> Array:
-    """Distance of the object [m], (count,): the one there is, or as chosen between both ends."""
-    far = float(stage.platform.distance_m)
-    if "distance" not in picked or stage.platform.nearest_m is None:
-        return np.full(count, far)
-    near = float(stage.platform.nearest_m)
-    between: Array = 0.5 * (near + far) + 0.5 * (far - near) * picked["distance"][0]
-    return between
 
 
 def _sigma(stage: Stage, rows: StageRows) -> SensorSigma:

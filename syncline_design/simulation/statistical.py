@@ -8,7 +8,7 @@ over all g counts (JCGM 100:2008 with exact shifts).  Units SI; errors north, ea
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from statistics import NormalDist
 from typing import Literal
@@ -19,8 +19,10 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
+from syncline_design.simulation.approximation import Asked, three_moments
 from syncline_design.simulation.ascent import Ascent, FreeVector, Index
 from syncline_design.simulation.lattice import MANY_POINTS, POINTS, sphere_lattice
+from syncline_design.simulation.propagation import Law, propagation
 from syncline_design.simulation.settings import demand_simulable
 from syncline_design.simulation.situations import Moments, Situations
 
@@ -60,6 +62,15 @@ class Wanted:
             a, b * situations.last_ranges_m(point)
         )
         return found
+
+    def weight_slopes(self, situations: Situations, point: Array) -> tuple[Array, Array]:
+        """`weight` (n,) and its slopes (p, n)."""
+        weight, slopes = self.weight(situations, point), np.zeros(point.shape)
+        if self.rule is not None and not isinstance(weight, float):
+            a, b = self.rule
+            far, by_point = situations.last_ranges_m(point), situations.last_range_slopes_m()
+            slopes = by_point[:, None] * (-weight * b * b * far / (a * a + b * b * far * far))
+        return np.broadcast_to(weight, point.shape[1:]), slopes
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +121,7 @@ def _promising(
 
     What is largest in space is at least as large as what is largest horizontally.
     """
-    mean, covariance = propagated(situations, found)
+    mean, covariance = propagation(situations).of(found)
     out = []
     for k, one in enumerate(wanted):
         order = np.argsort(-approximate(mean, covariance, one) * one.weight(situations, found))
@@ -134,7 +145,7 @@ def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int) ->
     situations = Situations(system)
     pool = situations.starting_points(seed, _POOL)
     weight = wanted.weight(situations, pool)
-    best = int(np.argmax(approximate(*propagated(situations, pool), wanted) * weight))
+    best = int(np.argmax(approximate(*propagation(situations).of(pool), wanted) * weight))
     nodes, point = situations.nodes(_QUICK_NODES), pool[:, best : best + 1]
     moments = situations.moments(point, nodes)
     least = float(limit_m * (1.0 + CLOSE) / np.max(wanted.weight(situations, point)))
@@ -165,52 +176,53 @@ def _worst_points(situations: Situations, wanted: Sequence[Wanted], seed: int) -
     First by propagation; where shifts are long or effects act, the best of these go on with the
     shifts as they are.
     """
-    count = len(wanted)
-
-    def linear(point: Array) -> tuple[Array, Array]:
-        return propagated(situations, point)
-
+    count, law = len(wanted), propagation(situations)
     pool = situations.starting_points(seed, _POOL)
-    mean, covariance = linear(pool)
+    mean, covariance = law.of(pool)
     ranked = [
         np.argsort(-approximate(mean, covariance, one) * one.weight(situations, pool))[:_STARTS]
         for one in wanted
     ]
     point, of = pool[:, np.concatenate(ranked)], np.repeat(np.arange(count), _STARTS)
-    value = _ascent(situations, wanted, linear).ascend(
-        point, of, np.full(count, np.inf), _ROUGH, _ITERATIONS
-    )
-    summed, kept = linear, 1
+    value = _ascent(law, wanted).ascend(point, of, np.full(count, np.inf), _ROUGH, _ITERATIONS)
+    kept = 1
     if not situations.linear:
-        nodes, kept = situations.nodes(_SEARCH_NODES), _STARTS_EXACT
-
-        def summed(point: Array) -> tuple[Array, Array]:
-            return averaged(situations.moments(point, nodes))
-
+        kept = _STARTS_EXACT
+        law = Law(situations, "averaged", situations.nodes(_SEARCH_NODES))
     best = np.argsort(-value.reshape(count, _STARTS), axis=1)[:, :kept]
     point = point[:, (best + _STARTS * np.arange(count)[:, None]).ravel()]
     of = np.repeat(np.arange(count), kept)
-    value = _ascent(situations, wanted, summed).ascend(
+    value = _ascent(law, wanted).ascend(
         point, of, np.full(count, np.inf), _SETTLED if situations.linear else _ROUGH, _ITERATIONS
     )
     return point[:, value.reshape(count, kept).argmax(axis=1) + kept * np.arange(count)]
 
 
-def _ascent(
-    situations: Situations,
-    wanted: Sequence[Wanted],
-    summed: Callable[[Array], tuple[Array, Array]],
-) -> Ascent:
+def _ascent(law: Law, wanted: Sequence[Wanted]) -> Ascent:
+    situations, all_asked = law.situations, asked_of(wanted)
+    ruled = [k for k, one in enumerate(wanted) if one.rule is not None]
+
+    def asked(of: Index) -> Asked:
+        return Asked(all_asked.axes[of], all_asked.normal[of])
+
     def objective(point: Array, of: Index) -> Array:
-        mean, covariance = summed(point)
-        value = np.empty(of.shape)
-        for k, one in enumerate(wanted):
+        value = three_moments(*law.of(point), asked(of)).figures()
+        for k in ruled:
             mine = of == k
-            weight = one.weight(situations, point[:, mine])
-            value[mine] = approximate(mean[mine], covariance[mine], one) * weight
+            value[mine] *= wanted[k].weight(situations, point[:, mine])
         return value
 
-    return Ascent(situations.blocks, objective)
+    def slopes(point: Array, of: Index) -> Array:
+        at = law.sloped(point)
+        moments = three_moments(at.mean, at.covariance, asked(of))
+        found = at.slopes(*moments.slopes())
+        for k in ruled:
+            mine = np.flatnonzero(of == k)
+            weight, bent = wanted[k].weight_slopes(situations, point[:, mine])
+            found[:, mine] = found[:, mine] * weight + bent * moments.figures()[mine]
+        return found
+
+    return Ascent(situations.blocks, objective, None if situations.acting else slopes)
 
 
 def _evaluated(situations: Situations, wanted: Wanted, point: Array, moments: Moments) -> Worst:
@@ -221,55 +233,20 @@ def _evaluated(situations: Situations, wanted: Wanted, point: Array, moments: Mo
     return Worst(wanted, value, point, weighted, away, situations.blocks)
 
 
-def propagated(situations: Situations, point: Array) -> tuple[Array, Array]:
-    """(mean (n, 3), covariance (n, 3, 3)) of points by the law of propagation.
-
-    C = J J' + sum_k c_k c_k', c_k what one standard deviation of variable k does
-    (JCGM 100:2008, eq. 13, independent inputs).
-    """
-    mean, columns = columns_at(situations, point)
-    return mean, columns @ np.swapaxes(columns, 1, 2)
-
-
-def columns_at(situations: Situations, point: Array) -> tuple[Array, Array]:
-    """(mean (n, 3), what one standard deviation of each noise and variable does (n, 3, c))."""
-    about = situations.moments(point, situations.steps())
-    mean = about.mean_m[:, 0]
-    by_timing = np.swapaxes(about.mean_m[:, 1:] - mean[:, None], 1, 2)
-    return mean, np.concatenate([about.slopes_m[:, 0], by_timing], axis=2)
-
-
-def averaged(moments: Moments) -> tuple[Array, Array]:
-    """(mean, covariance) over equally likely nodes."""
-    mean = moments.mean_m.mean(axis=1)
-    spread = moments.mean_m - mean[:, None]
-    within = np.mean(moments.covariance(), axis=1)
-    return mean, within + np.einsum("nmi,nmj->nij", spread, spread) / spread.shape[1]
-
-
 def approximate(mean: Array, covariance: Array, wanted: Wanted) -> Array:
-    """A figure by three moments, (n,): only to find where it is largest.
+    """A figure by three moments, (n,): only to find where it is largest."""
+    one = asked_of((wanted,))
+    asked = Asked(np.repeat(one.axes, len(mean), axis=0), np.repeat(one.normal, len(mean)))
+    return three_moments(mean, covariance, asked).figures()
 
-    Q = sum of lambda chi2 is taken as a shifted, scaled chi2 of h = c2^3 / c3^2 degrees of freedom,
-    c_r = tr C^r + r m' C^(r-1) m (Imhof, Biometrika 48, 1961, after Pearson), its quantile by
-    Wilson and Hilferty (1931).
-    """
-    axes = AXES[wanted.axis]
-    m, c = mean[:, axes], covariance[:, axes, axes]
-    first = np.trace(c, axis1=1, axis2=2) + np.sum(m * m, axis=1)
-    if wanted.p is None:
-        root: Array = np.sqrt(first)
-        return root
-    c_m = np.einsum("nij,nj->ni", c, m)
-    squared = c @ c
-    second = np.trace(squared, axis1=1, axis2=2) + 2.0 * np.sum(m * c_m, axis=1)
-    third = np.einsum("nij,nji->n", squared, c) + 3.0 * np.sum(c_m * c_m, axis=1)
-    third_or_1 = np.where(third > 0.0, third, 1.0)
-    h = np.where(third > 0.0, second * (second / third_or_1) ** 2, 1.0)
-    z = NormalDist().inv_cdf(wanted.p)
-    chi2 = h * np.maximum(1.0 - 2.0 / (9.0 * h) + z * np.sqrt(2.0 / (9.0 * h)), 0.0) ** 3
-    found: Array = np.sqrt(np.maximum(first + (chi2 - h) * np.sqrt(second / h), 0.0))
-    return found
+
+def asked_of(wanted: Sequence[Wanted]) -> Asked:
+    """The axes and the shares of figures."""
+    axes = np.zeros((len(wanted), 3))
+    for row, one in zip(axes, wanted, strict=True):
+        row[AXES[one.axis]] = 1.0
+    normal = [math.nan if one.p is None else NormalDist().inv_cdf(one.p) for one in wanted]
+    return Asked(axes, np.array(normal))
 
 
 def exact(moments: Moments, wanted: Wanted, skipped: int) -> float:

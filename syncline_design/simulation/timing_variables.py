@@ -99,6 +99,10 @@ class SystemTiming:
                 found[key] = found[key] + variable.sign * row
         return found
 
+    def signs(self, key: Key) -> Array:
+        """How mu of a sensor follows each variable (variables,): 1, -1 or 0."""
+        return np.array([v.sign if key in v.moves else 0.0 for v in self.variables])
+
 
 def timing_of(system: System) -> SystemTiming:
     """The timing variables of a system; clocks of different vehicles are independent."""

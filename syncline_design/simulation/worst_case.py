@@ -30,7 +30,7 @@ from syncline_design.simulation.ascent import (
 from syncline_design.simulation.bounds import references
 from syncline_design.simulation.draws import lever_arms, shaped
 from syncline_design.simulation.results import WorstCase, worst_case
-from syncline_design.simulation.situations import bearings, sights
+from syncline_design.simulation.sights import bearings, sights
 from syncline_design.simulation.surroundings import leaning, moment_at
 
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
