@@ -31,7 +31,7 @@ from syncline_design.model.timing import (
 from syncline_design.simulation.draws import entering
 from syncline_design.simulation.lattice import lattice, normal_row
 
-Key = tuple[str, RoleName]  # of a sensor: stage and role
+StampKey = tuple[str, RoleName]  # of a sensor: stage and role
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class TimingVariable:
     mission: bool
     centred: Distribution
     sign: float
-    moves: tuple[Key, ...]
+    moves: tuple[StampKey, ...]
 
     @property
     def std_s(self) -> float:
@@ -88,10 +88,10 @@ class TimingVariable:
 class SystemTiming:
     """A system's timestamp errors: mean of each sensor's mu [s], and what scatters about it."""
 
-    mean_s: dict[Key, float]
+    mean_s: dict[StampKey, float]
     variables: tuple[TimingVariable, ...]
 
-    def shifts(self, values: Array) -> dict[Key, Array]:
+    def shifts(self, values: Array) -> dict[StampKey, Array]:
         """mu [s] of every sensor at values (variables, n) of the variables."""
         found = {key: np.full(values.shape[1], mean_s) for key, mean_s in self.mean_s.items()}
         for variable, row in zip(self.variables, values, strict=True):
@@ -99,19 +99,19 @@ class SystemTiming:
                 found[key] = found[key] + variable.sign * row
         return found
 
-    def signs(self, key: Key) -> Array:
+    def signs(self, key: StampKey) -> Array:
         """How mu of a sensor follows each variable (variables,): 1, -1 or 0."""
         return np.array([v.sign if key in v.moves else 0.0 for v in self.variables])
 
 
 def timing_of(system: System) -> SystemTiming:
     """The timing variables of a system; clocks of different vehicles are independent."""
-    means: dict[Key, float] = {}
+    means: dict[StampKey, float] = {}
     variables: list[TimingVariable] = []
-    on_clock: dict[str, list[Key]] = {}
+    on_clock: dict[str, list[StampKey]] = {}
     for stage in system.stages:
         for sensor in entering(stage):
-            key: Key = (stage.name, sensor.role)
+            key: StampKey = (stage.name, sensor.role)
             means[key] = expected(sensor.timing)
             on_clock.setdefault(sensor.timeline, []).append(key)
             name = f"timestamp of {stage.name}.{sensor.role}"
@@ -128,7 +128,7 @@ def timing_of(system: System) -> SystemTiming:
 
 
 def _variables(
-    name: str, error: TimingError, sign: float, keys: tuple[Key, ...], mission: bool
+    name: str, error: TimingError, sign: float, keys: tuple[StampKey, ...], mission: bool
 ) -> Iterator[TimingVariable]:
     """The distribution about its mean, what a calibration leaves, what a clock drifted away."""
     own = TimingVariable(name, mission, _centred(error.distribution), sign, keys)

@@ -27,7 +27,7 @@ from syncline_design.simulation.draws import lever_arms, ranging_shares
 from syncline_design.simulation.kernel import cross, rotation_terms
 from syncline_design.simulation.sights import bearings, ranges_m
 from syncline_design.simulation.surroundings import leaning
-from syncline_design.simulation.timing_variables import Key, SystemTiming
+from syncline_design.simulation.timing_variables import StampKey, SystemTiming
 
 Terms = tuple[Array, ...]
 
@@ -267,11 +267,11 @@ class RelativeShifts:
 def relative_shifts(system: System, timing: SystemTiming, index: int) -> RelativeShifts:
     """Position (a later stage's: the ranging before it) and attitude against the ranging."""
     stage = system.stages[index]
-    position: Key = (stage.name, "position")
+    position: StampKey = (stage.name, "position")
     if index > 0:
         position = (system.stages[index - 1].name, "ranging")
-    keys: tuple[Key, ...] = (position, (stage.name, "attitude"))
-    ranging: Key = (stage.name, "ranging")
+    keys: tuple[StampKey, ...] = (position, (stage.name, "attitude"))
+    ranging: StampKey = (stage.name, "ranging")
     mean, signs = timing.mean_s, timing.signs
     return RelativeShifts(
         np.array([mean.get(key, 0.0) - mean.get(ranging, 0.0) for key in keys]),
