@@ -80,7 +80,7 @@ def test_states_vary_as_the_whole_matrix_says(n: int) -> None:
     flat = (3 * n, 3 * n)
     whole = np.linalg.inv(np.linalg.inv(prior.reshape(flat)) + seen.reshape(flat))
     blocks = whole.reshape(n, 3, n, 3)
-    same, following = _blocks(factored(white, loading, time_s, constants).factor, 3)
+    same, following = _blocks(factored(white, loading, time_s, constants))
     assert same == pytest.approx(np.array([blocks[i, :, i] for i in range(n)]), abs=1e-9)
     expected = [np.diagonal(blocks[i + 1, :, i]) for i in range(n - 1)]
     assert following == pytest.approx(np.array(expected).reshape(-1, 3), abs=1e-9)

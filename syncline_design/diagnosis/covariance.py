@@ -24,6 +24,7 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import Index, groups, repeated, starts, summed
 from syncline_design.machine.quick_dataclass import dataclass
 
+_MANY = 100  # columns from which a step in Python for each stamp is cheaper than columns in turn
 _LEAST_STEP = 1e-9  # least dt / T: keeps 1 - phi^2 above rounding
 
 
@@ -98,6 +99,7 @@ class Precision:
     white_inverse: Array  # (n, 3, 3) Sigma^-1
     loading: Array  # (n, 3, m) B
     factor: Array  # (m + 1, k m) banded Cholesky factor of P over k stamps, lower form
+    step: Array  # (k - 1, m) of P between one stamp and the next, where it is diagonal
     log_determinant: float
     slow: NDArray[np.bool_]  # (m,) which processes last from stamp to stamp
     first: Index | None = None  # first row of every stamp, where rows share stamps
@@ -123,9 +125,35 @@ class Precision:
         right = np.swapaxes(self.loading, 1, 2) @ weighted
         if self.first is not None:
             right = summed(self.first, right)
-        states: Array = cho_solve_banded((self.factor, True), right.reshape(-1, c))
-        states = states.reshape(-1, m, c)
+        if c < _MANY:
+            found: Array = cho_solve_banded((self.factor, True), right.reshape(-1, c))
+            states = found.reshape(-1, m, c)
+        else:
+            states = self._side_by_side(right)
         return states if self.group is None else states[self.group]
+
+    def _side_by_side(self, right: Array) -> Array:
+        """P^-1 R of many columns, R (k, m, c): stamp by stamp, all columns of one at once.
+
+        With A_i the inverse of L_ii L_ii' and D_i the block of P between two stamps, forwards
+        z_i = A_i (r_i - D_i-1 z_i-1), backwards x_i = z_i - A_i D_i x_i+1.
+        """
+        own, step = self.own_blocks(), self.step[:, :, None]
+        states = np.empty_like(right)
+        states[0] = own[0] @ right[0]
+        for i in range(1, len(right)):
+            np.matmul(own[i], right[i] - step[i - 1] * states[i - 1], out=states[i])
+        for i in range(len(right) - 2, -1, -1):
+            states[i] -= own[i] @ (step[i] * states[i + 1])
+        return states
+
+    def own_blocks(self) -> Array:
+        """Inverses (k, m, m) of L_ii L_ii', L_ii the factor's triangle of one stamp."""
+        m = self.loading.shape[2]
+        bands = self.factor.T.reshape(-1, m, m + 1)
+        inverse = lower_inverse(np.ascontiguousarray(np.moveaxis(bands, 2, 0)))
+        own: Array = np.swapaxes(inverse, 1, 2) @ inverse
+        return own
 
     def slow_part(self, error: Array) -> Array:
         """B x + U s of what is slow and what lasts, posterior means given the series (n, 3)."""
@@ -164,25 +192,37 @@ def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array
     m = loading.shape[2]
     slow = time_constant_s > 0.0
     if m == 0:
-        return Precision(inverse, loading, np.zeros((1, 0)), log_det, slow)
+        return Precision(inverse, loading, np.zeros((1, 0)), np.zeros((0, 0)), log_det, slow)
     inner = np.swapaxes(loading, 1, 2) @ inverse @ loading
     first = group = None
     if repeated(time_s):
         first, group = starts(time_s), groups(time_s)
         time_s, inner = time_s[first], summed(first, inner)
     band, log_prior = _markov_precision(time_s, time_constant_s)
-    for k in range(m):
-        # column j of the lower band holds A[j + k, j]; inside a block only while j % m + k < m
-        diagonal = np.zeros((inner.shape[0], m))
-        diagonal[:, : m - k] = np.diagonal(inner, offset=-k, axis1=1, axis2=2)
-        band[k] += diagonal.ravel()
-    factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+    blocks = band.reshape(-1, m, m + 1)
+    for b in range(m):  # the place of A[j + k, j] is (j, k)
+        blocks[:, b, : m - b] += inner[:, b, b:]
+    step = blocks[:-1, :, m].copy()
+    factor = cholesky_banded(band.T, lower=True, overwrite_ab=True, check_finite=False)
     log_det += 2.0 * float(np.sum(np.log(factor[0]))) - log_prior
-    return Precision(inverse, loading, factor, log_det, slow, first, group)
+    return Precision(inverse, loading, factor, step, log_det, slow, first, group)
+
+
+def lower_inverse(bands: Array) -> Array:
+    """Inverses (n, m, m) of the lower triangles (n, m, m) in bands (>= m, n, m), row by row."""
+    n, m = bands.shape[1:]
+    found = np.zeros((m, m, n))
+    for a in range(m):
+        before = np.array([bands[a - b, :, b] for b in range(a)]).reshape(a, n)
+        found[a] = -np.einsum("bn,bcn->cn", before, found[:a])
+        found[a, a] += 1.0
+        found[a] /= bands[0, :, a]
+    return np.ascontiguousarray(np.moveaxis(found, 2, 0))
 
 
 def _markov_precision(time_s: Array, time_constant_s: Array) -> tuple[Array, float]:
-    """K^-1 of m unit Gauss-Markov processes as a lower band (m + 1, n m), and its log determinant.
+    """K^-1 of m unit Gauss-Markov processes as a lower band, column by column (n m, m + 1), and
+    its log determinant.
 
     Tridiagonal per process: with phi_i over step i and g_i = 1 / (1 - phi_i^2), the diagonal is
     g_{i-1} + phi_i^2 g_i (1 + phi_0^2 g_0 at the start) and the off-diagonal -phi_i g_i.
@@ -192,10 +232,9 @@ def _markov_precision(time_s: Array, time_constant_s: Array) -> tuple[Array, flo
         ratio = np.maximum(np.diff(time_s)[:, None] / time_constant_s, _LEAST_STEP)
     fresh = -np.expm1(-2.0 * ratio)  # 1 - phi^2
     phi = np.exp(-ratio)
-    band = np.zeros((m + 1, n * m))
-    diagonal = np.ones((n, m))
-    diagonal[1:] = 1.0 / fresh
-    diagonal[:-1] += phi * phi / fresh
-    band[0] = diagonal.ravel()
-    band[m, : (n - 1) * m] = (-phi / fresh).ravel()
-    return band, -float(np.sum(np.log(fresh)))
+    band = np.zeros((n, m, m + 1))
+    band[0, :, 0] = 1.0
+    band[1:, :, 0] = 1.0 / fresh
+    band[:-1, :, 0] += phi * phi / fresh
+    band[:-1, :, m] = -phi / fresh
+    return band.reshape(n * m, m + 1), -float(np.sum(np.log(fresh)))

@@ -7,8 +7,8 @@ NLL = (e' C^-1 e + log|C|) / 2:
     D_i = Sigma_i^-1 - Sigma_i^-1 B_i S B_i' Sigma_i^-1,
     d NLL / d log b_c = sum [S (B' Sigma^-1 B)]_cc - a' B_c x_c,   b_c the scale of column c of B
     d NLL / d log T_c = 1/2 (tr((S + x x') dQ_c) - d log|Q_c|),   Q = K^-1
-Blocks of S run backwards along the factor P = L L': S_ii = L_ii^-T L_ii^-1 + G' S_i+1,i+1 G,
-S_i+1,i = -S_i+1,i+1 G, G = L_i+1,i L_ii^-1.
+Blocks of S run backwards along the factor P = L L': S_ii = A_i + G' S_i+1,i+1 G,
+S_i+1,i = -S_i+1,i+1 G, A_i = L_ii^-T L_ii^-1, G = L_i+1,i L_ii^-1 = D_i A_i with D_i = P_i+1,i.
 Source: Takahashi et al. (1973), as in Rue and Held, Gaussian Markov Random Fields (2005), ch. 2.
 """
 
@@ -54,13 +54,13 @@ def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Arr
         return Slopes(0.5 * (inverse - outer), none, none, squares, 0.5 * inverse, none)
     states = known.states(weighted)[:, :, 0]  # at every row
     left = weighted[:, :, 0] - (inverse @ (loading @ states[:, :, None]))[:, :, 0]
-    same, next_same = _blocks(known.factor, m)
+    same, next_same = _blocks(known)
     at_rows = same if known.group is None else same[known.group]
     seen = inverse @ loading
-    expected = inverse - seen @ at_rows @ np.swapaxes(seen, 1, 2)
+    spread = seen @ at_rows
+    expected = inverse - spread @ np.swapaxes(seen, 1, 2)
     white = expected - left[:, :, None] * left[:, None, :]
-    inner = np.swapaxes(loading, 1, 2) @ seen
-    made_up = np.einsum("nab,nba->a", at_rows, inner)
+    made_up = np.einsum("nia,nia->a", spread, loading)
     column = made_up - np.einsum("ni,nic,nc->c", left, loading, states)
     if known.first is not None:
         time_s, states = time_s[known.first], states[known.first]
@@ -69,32 +69,13 @@ def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Arr
     return Slopes(0.5 * white, column, times, squares, 0.5 * expected, made_up)
 
 
-def _blocks(factor: Array, m: int) -> tuple[Array, Array]:
+def _blocks(known: Precision) -> tuple[Array, Array]:
     """Blocks of S: of one stamp (n, m, m), and the diagonals of those of neighbours (n - 1, m)."""
-    bands = factor.reshape(m + 1, -1, m)
-    n = bands.shape[1]
-    below = np.zeros((n - 1, m, m))
-    for a in range(m):
-        for b in range(a, m):
-            below[:, a, b] = bands[m + a - b, :-1, b]
-    inverse = _lower_inverse(bands)
-    own = np.swapaxes(inverse, 1, 2) @ inverse
-    carry = below @ inverse[:-1]
+    own = known.own_blocks()
+    carry = known.step[:, :, None] * own[:-1]
     own[:-1] = _carried(own, carry)
     following = -np.einsum("nab,nba->na", own[1:], carry)
     return own, following
-
-
-def _lower_inverse(bands: Array) -> Array:
-    """Inverses (n, m, m) of the lower triangles (n, m, m) in bands (>= m, n, m), row by row."""
-    n, m = bands.shape[1:]
-    found = np.zeros((m, m, n))
-    for a in range(m):
-        before = np.array([bands[a - b, :, b] for b in range(a)]).reshape(a, n)
-        found[a] = -np.einsum("bn,bcn->cn", before, found[:a])
-        found[a, a] += 1.0
-        found[a] /= bands[0, :, a]
-    return np.ascontiguousarray(np.moveaxis(found, 2, 0))
 
 
 def _carried(own: Array, carry: Array) -> Array:
