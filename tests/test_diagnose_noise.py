@@ -63,9 +63,28 @@ def test_banded_algebra_is_the_dense_one(m: int) -> None:
     series = rng.standard_normal((15, 3, 5))
     expected = np.linalg.solve(full, series.reshape(45, 5)).reshape(15, 3, 5)
     assert known.solve(series) == pytest.approx(expected, abs=1e-10)
+    many = np.tile(series, 25)  # solved side by side
+    assert known.solve(many) == pytest.approx(np.tile(expected, 25), abs=1e-10)
     error = series[:, :, 0]
     density = multivariate_normal(np.zeros(45), full).logpdf(error.ravel())
     assert known.negative_log_likelihood(error) == pytest.approx(-density, rel=1e-10)
+
+
+@pytest.mark.parametrize("repeated", [False, True])
+def test_many_columns_are_solved_as_each_alone(repeated: bool) -> None:
+    """200 columns at once and five at a time, rows that share stamps, gaps, time constants from
+    nothing to a year beside steps of 10 ms: to 1e-9 of the largest of their column."""
+    rng = np.random.default_rng(5)
+    n, constants = 400, np.array([0.0, 0.0, 0.5, 60.0, 3.0e7, 3.0e7])
+    step = rng.choice([0.01, 0.02, 30.0], n, p=[0.6, 0.39, 0.01])
+    time_s = np.cumsum(step if not repeated else np.where(np.arange(n) % 3, 0.0, step))
+    root = rng.standard_normal((n, 3, 3))
+    white = root @ np.swapaxes(root, 1, 2) + 0.1 * np.eye(3)
+    known = factored(white, rng.standard_normal((n, 3, 6)), time_s, constants)
+    series = rng.standard_normal((n, 3, 200))
+    together = known.solve(series)
+    alone = np.concatenate([known.solve(series[:, :, k : k + 5]) for k in range(0, 200, 5)], axis=2)
+    assert np.all(np.abs(together - alone) < 1e-9 * np.max(np.abs(alone), axis=(0, 1)))
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7, 15])

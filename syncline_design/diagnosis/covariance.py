@@ -141,10 +141,12 @@ class Precision:
         own, step = self.own_blocks(), self.step[:, :, None]
         states = np.empty_like(right)
         states[0] = own[0] @ right[0]
-        for i in range(1, len(right)):
-            np.matmul(own[i], right[i] - step[i - 1] * states[i - 1], out=states[i])
-        for i in range(len(right) - 2, -1, -1):
-            states[i] -= own[i] @ (step[i] * states[i + 1])
+        before = states[0]
+        for block, off, row, found in zip(own[1:], step, right[1:], states[1:], strict=True):
+            before = np.matmul(block, row - off * before, out=found)
+        for block, off, found in zip(own[-2::-1], step[::-1], states[-2::-1], strict=True):
+            found -= block @ (off * before)
+            before = found
         return states
 
     def own_blocks(self) -> Array:
