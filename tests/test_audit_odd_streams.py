@@ -78,6 +78,25 @@ def test_a_short_counter_in_a_gap_of_many_turns(tmp_path: Path) -> None:
     assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.05)
 
 
+@pytest.mark.parametrize("forward", [True, False])
+def test_a_sensor_that_measures_ever_faster_leaves_out_nothing(
+    tmp_path: Path, forward: bool
+) -> None:
+    rng = np.random.default_rng(12)
+    interval = 0.02 + 0.1 * np.exp(-np.arange(4000) * 0.02 / 4.0)
+    t = np.cumsum(interval if forward else interval[::-1])
+    row = said(tmp_path, BEGAN_NS + ns(t), BEGAN_NS + ns(delayed(t, rng, 5e-4)))
+    assert not counted(row)
+
+
+def test_gaps_between_single_messages_are_gaps(tmp_path: Path) -> None:
+    rng = np.random.default_rng(13)
+    t = np.arange(5000) / 50.0
+    held = (t < 20.0) | (t > 32.0) | np.isin(np.arange(5000), [1200, 1400])
+    row = said(tmp_path, BEGAN_NS + ns(t[held]), BEGAN_NS + ns(delayed(t[held], rng, 5e-4)))
+    assert [fault.fault for fault in counted(row)] == ["gap", "gap", "gap"]
+
+
 def test_receipts_of_one_moment_are_no_internal_error(tmp_path: Path) -> None:
     t = np.arange(400) / 10.0
     row = said(tmp_path, BEGAN_NS + ns(t), np.full(400, BEGAN_NS))

@@ -44,7 +44,8 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
         return StampFault("stamped_on_arrival", {}, None, None,
                           "every stamp equals its receipt")  # fmt: skip
     transport = _width(late)
-    return _scattered(about, transport) or _waited(when, transport) or _in_frames(when, transport)
+    late_ones = _scattered(about, transport) or _waited(without_losses(when, pace), transport)
+    return late_ones or _in_frames(when, transport)
 
 
 def _when(series: Series, pace: Cadence) -> Array:

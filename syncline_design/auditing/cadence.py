@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.coarse_rhythm import Counted
+from syncline_design.auditing.pauses import LONG_GAP, Pauses, pauses_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, scatter, seconds, spread
 from syncline_design.logs.readers.stream import UNSET
@@ -40,7 +41,8 @@ _HOLE: Final = 0.85  # of an interval: more than a late message
 _WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
 _AS_EVER: Final = 0.5  # of a hole's messages that are not missing among receipts
 _IN_A_ROW: Final = 8  # intervals that are lengthened alike: no chance losses
-LONG_GAP: Final = 4  # missing in a row; fewer may be single losses
+_NEXT: Final = 2  # intervals on each side
+_BEYOND: Final = 1.5  # of the shortest about it: less is no hole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +51,7 @@ class Cadence:
 
     period_s: median interval, of regular stamps the fitted one.  regular: stamps follow a rhythm.
     jitter_s: scatter of a stamp about it.  steps: intervals between neighbours in whole periods.
-    uneven: whether the intervals vary beyond the clock's own resolution.
+    pauses: where silence belongs to how it measures.
     """
 
     period_s: float
@@ -58,6 +60,7 @@ class Cadence:
     steps: Array
     interval: Array  # s
     places: np.ndarray
+    pauses: Pauses | None = None
 
 
 def cadence(series: Series) -> Cadence:
@@ -75,7 +78,9 @@ def cadence(series: Series) -> Cadence:
     within = float(np.mean(np.abs(off[usual]) < REGULAR * period)) if usual.any() else 0.0
     # how an irregular sensor betrays itself: its intervals do not add up
     regular = within > 0.93 and not _walks(off, usual, period)
-    return Cadence(period, regular, float(jitter), steps, interval, places)
+    pauses = pauses_of(interval, steps, period)
+    regular = regular and not (pauses is not None and pauses.anew)
+    return Cadence(period, regular, float(jitter), steps, interval, places, pauses)
 
 
 def _period(forward: Array) -> float:
@@ -122,7 +127,10 @@ def counted_over_gaps(when: Array) -> Array | None:
 
 
 def without_losses(when: Array, pace: Cadence) -> Array:
-    """Stamps [s] of an even sensor as if none of its messages were missing."""
+    """Stamps [s] of an even sensor as if none of its messages were missing, nor any pause made."""
+    if pace.pauses is not None and pace.pauses.anew:
+        paused = np.where(pace.steps > LONG_GAP, pace.interval - pace.period_s, 0.0)
+        return np.asarray(when - np.concatenate([[0.0], np.cumsum(paused)]))
     if not pace.regular or pace.jitter_s > _EVEN * pace.period_s:
         return when
     left_out = np.maximum(pace.steps - 1.0, 0.0) * pace.period_s
@@ -172,6 +180,7 @@ def missing(
         lost = _of_both(series, pace, _beside_unusable(count.lost, pace), level_s)
     else:
         lost = _lost(series, pace, level_s) if pace.regular else _holes(pace)
+        lost[pace.interval < _BEYOND * _about(pace.interval)] = 0.0
     if not lost.any():
         return ()
     few = lost[(lost > 0) & (lost < LONG_GAP)]
@@ -186,10 +195,23 @@ def missing(
         long_ &= pace.interval > 0.5 * lost * pace.period_s
     if long_.sum() > max(2.0, _MOST_GAPS * long_.size):
         return ()
+    if pace.pauses is not None:
+        lost = np.where(pace.steps > LONG_GAP, 0.0, lost)
+        long_ &= lost > 0
     left_out = float(lost[~long_].sum()) + float(np.sum(at_another_rate(pace.steps)))
     blurred = blurred or (left_out > _MOST_LOST * lost.size and not _by_chance(pace.steps))
     singles = () if blurred else _losses(series, pace, np.where(long_, 0.0, lost))
     return (*_gaps(series, pace, long_), *singles)
+
+
+def _about(interval: Array) -> Array:
+    """The shortest of the four intervals about each: a sensor that measures ever faster, or less
+    often for a while, leaves out nothing."""
+    ends = np.full(_NEXT, np.inf)
+    near = np.lib.stride_tricks.sliding_window_view(
+        np.concatenate([ends, interval, ends]), 2 * _NEXT + 1
+    )
+    return np.asarray(np.delete(near, _NEXT, axis=1).min(axis=1))
 
 
 def _lost(series: Series, pace: Cadence, level_s: float) -> Array:

@@ -15,8 +15,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.auditing.cadence import LONG_GAP, Cadence, at_another_rate
+from syncline_design.auditing.cadence import Cadence, at_another_rate
 from syncline_design.auditing.naming import is_whole, slipped
+from syncline_design.auditing.pauses import LONG_GAP
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import (
     NS,

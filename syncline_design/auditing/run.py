@@ -28,6 +28,7 @@ from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead, content_of, note_read
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import percent
 from syncline_design.spec.load import BadInput
 
 _CSV: Final = "CSV"
@@ -227,6 +228,11 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
         far = in_words(one.breathing_s)
         said.append(f"why receipts move to and fro by {far} while its stamps keep their rhythm: "
                     "latency, or the sensor's own oscillator")  # fmt: skip
+    pauses = one.pace.pauses
+    if pauses is not None:
+        said.append(f"whether messages are missing in its {pauses.count} pauses, which take "
+                    f"{percent(pauses.share, 2)} of the log: they recur as those of a sensor that "
+                    "is switched on and off, or set off by events")  # fmt: skip
     late = one.overtaken
     if late.falls and late.fault is None:
         said.append(f"why {late.falls} messages came after later ones, by up to "
