@@ -77,8 +77,9 @@ def cadence(series: Series) -> Cadence:
     jitter = scatter(off[usual]) / np.sqrt(2.0)
     within = float(np.mean(np.abs(off[usual]) < REGULAR * period)) if usual.any() else 0.0
     # how an irregular sensor betrays itself: its intervals do not add up
-    regular = within > 0.93 and not _walks(off, usual, period)
-    pauses = pauses_of(interval, steps, period)
+    even = within > 0.93
+    regular = even and not _walks(off, usual, period)
+    pauses = pauses_of(interval, steps, period) if even else None
     regular = regular and not (pauses is not None and pauses.anew)
     return Cadence(period, regular, float(jitter), steps, interval, places, pauses)
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.measured_order import sequence_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Mask, Series
+from syncline_design.auditing.unrhythmic_order import order_without_rhythm
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
@@ -36,7 +37,7 @@ class Disorder:
 
     wrong: messages, in that order, whose stamps the rhythm has no place for.
     fault: where stamps were exchanged.  falls: stamps before the one of the message before;
-    deepest_s: by how much at most.
+    deepest_s: by how much at most.  by_rhythm: of clocks that may be set beside.
     """
 
     order: NDArray[np.intp] | None = None
@@ -44,6 +45,7 @@ class Disorder:
     fault: StampFault | None = None
     falls: int = 0
     deepest_s: float = 0.0
+    by_rhythm: bool = True
 
     def put(self, series: Series) -> Series:
         """Messages moved with both their times; of exchanged stamps these alone go back."""
@@ -68,7 +70,7 @@ def disorder_of(series: Series) -> Disorder:
     falls = np.flatnonzero(np.diff(series.stamp[places]) < 0)
     sequence = sequence_of(series) if falls.size else None
     if sequence is None or series.receive is None:
-        return Disorder()
+        return _without_rhythm(series) if falls.size else Disorder()
     overtaken = sequence.behind_ns > 0.0
     if not overtaken.any() or _in_whole_seconds(sequence.away_ns, overtaken):
         return Disorder(wrong=None if overtaken.any() else sequence.wrong)
@@ -88,6 +90,24 @@ def disorder_of(series: Series) -> Disorder:
     return Disorder(
         alone, None, _fault(series, places[falls + 1], count, deepest), count, deepest
     )  # fmt: skip
+
+
+def _without_rhythm(series: Series) -> Disorder:
+    """What threads noted out of order among stamps of packets, of a grid, or on arrival."""
+    order = order_without_rhythm(series)
+    if order is None:
+        return Disorder()
+    behind = _behind(series)
+    put_right = behind.copy()
+    put_right[order] -= _behind(replace(series, stamp=series.stamp[order], good=series.good[order]))
+    count = int(np.sum(put_right > 0))
+    return Disorder(order, None, None, count, float(put_right.max()) / NS, by_rhythm=False)
+
+
+def _behind(series: Series) -> NDArray[np.int64]:
+    """How far each usable stamp lies behind one of a message before [ns]."""
+    known = np.where(series.good, series.stamp, np.iinfo(np.int64).min)
+    return np.where(series.good, np.maximum.accumulate(known) - series.stamp, 0)
 
 
 def _in_whole_seconds(away_ns: NDArray[np.float64], overtaken: Mask) -> bool:

@@ -75,7 +75,7 @@ def sequence_of(series: Series) -> Sequence | None:
     if _folded(key, receive):
         return None
     jumps = _levels(late, np.abs(_advance(receive - stamp)) > least, least)  # of either clock
-    usual = jumps + _course(late - jumps)
+    usual = jumps + course(late - jumps)
     away = late - usual
     right = away > -least  # nothing comes before it was measured
     for _ in range(_ROUNDS):
@@ -140,7 +140,7 @@ def _empty(key: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate(found) if found else np.zeros(0, np.int64)
 
 
-def _course(values: Array) -> Array:
+def course(values: Array) -> Array:
     """The slow course of values: medians of blocks, and lines between them."""
     count = max(1, values.size // _BLOCK)
     kept = values[: count * _BLOCK]
@@ -290,11 +290,11 @@ def _displaced(
 
 
 def _periods(change: Array) -> Array:
-    """The usual interval about each [ns], as most messages near by have it."""
+    """The usual interval about each [ns], as most messages near by have it; 1 of equal stamps."""
     side = _NEXT // 2
     change = np.where(change > 0.0, change, np.median(change))
     padded = np.concatenate([change[side:0:-1], change, change[-2 : -side - 2 : -1]])
-    return np.asarray(np.median(sliding_window_view(padded, _NEXT), axis=1))
+    return np.maximum(np.median(sliding_window_view(padded, _NEXT), axis=1), 1.0)
 
 
 def _fits(change: Array, period: Array) -> Mask:

@@ -199,7 +199,7 @@ def _beside(disorder: Disorder, spikes: order.Repaired) -> order.Repaired:
     """Stamps out of order, where they are more than where a clock is set while messages overtake
     one another, and not of those that were put in order."""
     few = sum(float(f.parameters["count"]) for f in spikes.faults) < _AT_EDGES * disorder.falls
-    return replace(spikes, faults=()) if few else spikes
+    return replace(spikes, faults=()) if few and disorder.by_rhythm else spikes
 
 
 def _copied(one: Examined) -> bool:
@@ -211,7 +211,7 @@ def _copied(one: Examined) -> bool:
 
 def _at_edges(fault: StampFault, disorder: Disorder) -> bool:
     """Losses that are so few that they may be messages put in order where a clock was set."""
-    lost = fault.fault == "lost_messages"
+    lost = fault.fault == "lost_messages" and disorder.by_rhythm
     return lost and float(fault.parameters["count"]) < _STRAY * disorder.falls
 
 

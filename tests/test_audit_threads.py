@@ -1,0 +1,94 @@
+"""Stamps without a rhythm whose messages several threads note in another order.
+
+Every world is written down here: when a sensor measured, what its driver stamped, when each thread
+noted it.  The file is in order of the notes, as recorders write it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from syncline_design.auditing.stream import Examined, examined
+from syncline_design.logs.readers.stream import Stamps, Stream
+
+START = 1_780_000_000_000_000_000
+
+
+def audited(stamp: np.ndarray, noted: np.ndarray) -> Examined:
+    order = np.argsort(noted, kind="stable")
+    whole = (START + np.round(t[order] * 1e9).astype(np.int64) for t in (stamp, noted))
+    stamps = Stamps("header.stamp", "log time", *whole)
+    return examined(Stream("x", (), noted.size, stamps))
+
+
+def named(one: Examined) -> list[str]:
+    return [f.fault for f in one.faults]
+
+
+def in_packets(rate_hz: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """(moments measured, moments stamped) of 60 s behind a chip that hands on every 16 ms."""
+    true = 3e-4 + np.arange(int(min(60.0 * rate_hz, 20_000))) / rate_hz
+    handed = np.ceil((true + 4.3e-3) / 0.016) * 0.016
+    return true, handed + 1e-4 + rng.gamma(2.0, 5e-5, true.size)
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 200.0, 400.0, 1000.0])
+@pytest.mark.parametrize("threads_s", [6e-5, 2e-4, 6e-4])
+def test_packets_are_named_whatever_order_their_messages_were_noted_in(
+    rate_hz: float, threads_s: float
+) -> None:
+    rng = np.random.default_rng(1)
+    true, stamp = in_packets(rate_hz, rng)
+    noted = stamp + 1e-3 + rng.gamma(2.0, threads_s, true.size)
+    one = audited(stamp, noted)
+    assert named(one) == ["packetised"]
+    assert one.faults[0].parameters["interval_s"] == 0.016
+    assert one.overtaken.falls > 100
+    assert one.residual.bound == pytest.approx(np.ptp(noted - true), rel=0.1)
+
+
+def test_wrong_stamps_among_packets_that_threads_noted_stay_wrong() -> None:
+    rng = np.random.default_rng(2)
+    true, stamp = in_packets(200.0, rng)
+    noted = stamp + 1e-3 + rng.gamma(2.0, 2e-4, true.size)
+    stamp[[2000, 5000, 9000]] -= 0.3
+    one = audited(stamp, noted)
+    assert sorted(named(one)) == ["backward_jump", "packetised"]
+    fault = next(f for f in one.faults if f.fault == "backward_jump")
+    assert fault.parameters["count"] == 3.0
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 50.0, 137.0])
+@pytest.mark.parametrize("begins_s", [0.0, 40.0])
+def test_arrivals_that_threads_noted_are_arrivals_and_no_more(
+    rate_hz: float, begins_s: float
+) -> None:
+    rng = np.random.default_rng(3)
+    true = np.arange(int(90.0 * rate_hz)) / rate_hz
+    came = np.maximum.accumulate(true + 5e-3 + rng.gamma(2.0, 3e-3, true.size))
+    noted = came + rng.gamma(2.0, 5e-5, true.size)
+    one = audited(np.where(true >= begins_s, came, true), noted)
+    assert named(one) == ["stamped_on_arrival"]
+    begin = one.faults[0].from_s
+    assert (begin is None) if begins_s == 0.0 else begin == pytest.approx(begins_s, abs=0.2)
+
+
+@pytest.mark.parametrize(("rate_hz", "grain_s"), [(400.0, 1e-3), (137.0, 1e-2), (53.0, 1e-2)])
+def test_stamps_cut_off_to_a_grid_that_threads_noted(rate_hz: float, grain_s: float) -> None:
+    rng = np.random.default_rng(4)
+    true = 3e-4 + np.arange(int(60.0 * rate_hz)) / rate_hz
+    noted = true + 2e-3 + rng.gamma(2.0, 3e-4, true.size)
+    one = audited(np.floor(true / grain_s + 1e-9) * grain_s, noted)
+    assert named(one) == ["truncated_stamps"]
+    assert one.residual.bound == pytest.approx(np.ptp(noted - true), rel=0.1)
+
+
+def test_stamps_of_events_that_go_back_are_no_threads() -> None:
+    rng = np.random.default_rng(5)
+    true = np.cumsum(rng.exponential(0.3, 400))
+    noted = np.maximum.accumulate(true + 2e-3 + rng.gamma(2.0, 1e-3, true.size))
+    stamp = true.copy()
+    places = np.array([60, 170, 320])
+    stamp[places] = true[places - 1] - 0.05
+    assert named(audited(stamp, noted)) == ["backward_jump"]
