@@ -229,15 +229,16 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
         said.append(f"why receipts move to and fro by {far} while its stamps keep their rhythm: "
                     "latency, or the sensor's own oscillator")  # fmt: skip
     pauses = one.pace.pauses
-    if pauses is not None:
+    if pauses is not None and "packetised" not in names:
         said.append(f"whether messages are missing in its {pauses.count} pauses, which take "
                     f"{percent(pauses.share, 2)} of the log: they recur as those of a sensor that "
                     "is switched on and off, or set off by events")  # fmt: skip
     late = one.overtaken
     if late.falls and late.fault is None:
+        kept = ", and their stamps keep the rhythm" if late.by_rhythm else ""
         said.append(f"why {late.falls} messages came after later ones, by up to "
-                    f"{in_words(late.deepest_s)}: transport changed their order, and their stamps "
-                    "keep the rhythm (sort by stamp)")  # fmt: skip
+                    f"{in_words(late.deepest_s)}: transport changed their order{kept} (sort by "
+                    "stamp)")  # fmt: skip
     if not one.pace.regular and "packetised" not in names:
         said.append("single lost messages, and whether it was stamped on arrival: it has no rhythm")
     if one.smallest.step_s is None:
