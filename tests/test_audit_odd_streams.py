@@ -68,6 +68,42 @@ def test_a_counter_that_begins_anew_every_few_messages(
     assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.1)
 
 
+def turning(tmp_path: Path, rate: float, grain_ns: int, turn_ns: int) -> tuple[StreamAudit, float]:
+    """A counter that begins anew after 42 s, read in coarse ticks; with how far delays reach."""
+    rng = np.random.default_rng(14)
+    t = 0.3 / rate + np.arange(int(120 * rate)) / rate
+    receive = delayed(t, rng, 1e-3)
+    count = (ns(t) + turn_ns - 42 * 10**9) % turn_ns
+    return said(tmp_path, count // grain_ns * grain_ns, BEGAN_NS + ns(receive)), float(
+        np.ptp(receive - t)
+    )
+
+
+@pytest.mark.parametrize("rate", [9.7, 53.0, 137.0])
+@pytest.mark.parametrize(
+    ("grain_ns", "turn_ns"),
+    [(10**7, 2**32 * 1000), (10**6, 60 * 10**9), (10**8, 60 * 10**9), (10**7, 2**16 * 10**6)],
+)
+def test_a_counter_whose_ticks_are_coarse(
+    tmp_path: Path, rate: float, grain_ns: int, turn_ns: int
+) -> None:
+    """Its range is known by name, though each fall is off by a tick, and though many messages
+    carry the zero of a new turn."""
+    row, reach = turning(tmp_path, rate, grain_ns, turn_ns)
+    assert {fault.fault for fault in counted(row)} == {"counter_wrap", "truncated_stamps"}
+    wrap = next(fault for fault in row.faults if fault.fault == "counter_wrap")
+    assert wrap.parameters["wrap_s"] == turn_ns / 1e9
+    assert wrap.from_s == pytest.approx(42.0, abs=0.2)
+    assert row.residual_s.bound == pytest.approx(reach, rel=0.05)
+
+
+@pytest.mark.parametrize("rate", [20.0, 100.0])
+def test_ticks_that_a_turn_moves_are_no_step(tmp_path: Path, rate: float) -> None:
+    """The sensor keeps to the ticks, but 2^32 us are no whole number of 10 ms."""
+    row, _ = turning(tmp_path, rate, 10**7, 2**32 * 1000)
+    assert [fault.fault for fault in counted(row)] == ["counter_wrap"]
+
+
 def test_a_short_counter_in_a_gap_of_many_turns(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     t = np.arange(6000) / 100.0

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.auditing.grains import grain_of
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, in_words, scatter
 from syncline_design.machine.quick_dataclass import dataclass
@@ -35,8 +36,10 @@ _ALIASED: Final = 0.2  # share of falls from which on the range is of the order 
 _INSIDE: Final = 0.995
 _ALIKE: Final = 0.8  # of the falls, of a range that has no name
 _NEAR: Final = 1e-3  # of a range: how far from its name what was measured may be
+_TICK: Final = 0.003  # of a range: how coarse its ticks may be for it to have a name
 _WITHIN: Final = 0.3  # of a range: falls that are taken for the same
 _EVEN: Final = 0.35
+_GRAINS: Final = 1.1  # by which intervals of an even sensor differ on a grid
 _OFTEN: Final = 0.2  # of an interval
 _AROUND: Final = 20
 _BINS: Final = 10
@@ -79,7 +82,8 @@ def unwrapped(series: Series) -> Continuous:
     falls = np.flatnonzero(change < 0)
     if not falls.size:
         return Continuous(series)
-    expected, even = _expected(series, places, change)
+    grain = grain_of(stamp)
+    expected, even = _expected(series, places, change, grain)
     if falls.size > _ALIASED * change.size and not (even and _as_often(series, places, change)):
         return _aliased(series, places, stamp)
     period = float(np.median(change[change > 0])) if bool(np.any(change > 0)) else 0.0
@@ -89,7 +93,7 @@ def unwrapped(series: Series) -> Continuous:
         fallen = levels
     elif series.receive is not None:  # messages may be lost where the counter begins anew
         fallen = fallen + np.round((levels - fallen) / period) * period
-    found = _range(fallen, stamp, _noise(series, places, expected - change, even))
+    found = _range(fallen, stamp, _noise(series, places, expected - change, even), grain)
     if found is None:
         return Continuous(series)
     wrap, matching = found
@@ -150,15 +154,15 @@ def _fault(wrap: Range, count: int, first_s: float, last_s: float) -> StampFault
 
 
 def _expected(
-    series: Series, places: NDArray[np.intp], change: NDArray[np.int64]
+    series: Series, places: NDArray[np.intp], change: NDArray[np.int64], grain: int
 ) -> tuple[Array, bool]:
     """How far each stamp should be from the one before [ns], and whether an even rhythm says so.
 
-    A rhythm is exact to the stamps' own jitter; receipts to that of transport.
+    A rhythm is exact to the stamps' own jitter, or to their grain; receipts to that of transport.
     """
     forward = change[change > 0].astype(np.float64)
     period = float(np.median(forward)) if forward.size else 0.0
-    near = forward[np.abs(forward - period) < _EVEN * period]
+    near = forward[np.abs(forward - period) < max(_EVEN * period, _GRAINS * grain)]
     even = period > 0.0 and near.size > 0.9 * forward.size
     if series.receive is None:
         return np.full(change.size, period), even
@@ -197,7 +201,9 @@ def _noise(
     return max(own, 2e3)
 
 
-def _range(fallen: Array, stamp: NDArray[np.int64], noise: float) -> tuple[Range, Mask] | None:
+def _range(
+    fallen: Array, stamp: NDArray[np.int64], noise: float, grain: int
+) -> tuple[Range, Mask] | None:
     """The range of a counter whose falls these are, and which of the falls are its wraps."""
     for size in dict.fromkeys((float(np.median(fallen)), float(fallen.max()))):
         within = _WITHIN * size  # late messages make a fall seem larger; what is said is the median
@@ -207,6 +213,9 @@ def _range(fallen: Array, stamp: NDArray[np.int64], noise: float) -> tuple[Range
         middle = float(np.median(fallen[matching]))
         sure = min(6.0 * noise / np.sqrt(matching.sum()) + 2e3, _NEAR * middle)
         named = _named(middle, sure, stamp, bool(matching.all()))
+        if named is None and 0 < grain < _TICK * middle:
+            sure += grain
+            named = _named(middle, sure, stamp, bool(matching.all()))
         if named is not None:
             return named, matching
         if _fills(stamp, middle, sure, matching):

@@ -10,6 +10,7 @@ from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.coarse_rhythm import evenly
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
+from syncline_design.logs.readers.stream import Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
@@ -18,6 +19,7 @@ GRAINS: Final = (
     2 * 10**6, 10**6,
 )  # fmt: skip
 ROUNDING_NS: Final = 600  # of a file that keeps microseconds, or doubles of Unix seconds
+_ON_GRID: Final = 0.995  # of all times
 TIMERS: Final = (0.016, 0.008, 0.004, 0.005, 0.01, 0.02, 0.0125, 0.025, 0.032, 0.04, 0.05, 0.1)
 FTDI_S: Final = 0.016
 _FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
@@ -53,28 +55,33 @@ class Grain:
     explains_duplicates: bool
 
 
-def truncated(series: Series, pace: Cadence, file_step_ns: float) -> Grain | None:
+def grain_of(times: Nanoseconds) -> int:
+    """The coarsest grid of a millisecond or more that times lie on [ns]; 0 of finer ones."""
+    for grain in GRAINS:
+        rest = times % grain
+        if float(np.mean(np.minimum(rest, grain - rest) <= ROUNDING_NS)) >= _ON_GRID:
+            return grain
+    return 0
+
+
+def truncated(
+    series: Series, pace: Cadence, file_step_ns: float, told: Nanoseconds | None = None
+) -> Grain | None:
     """All stamps on a grid of a millisecond or more, while the sensor keeps none of it.
 
     A sensor that measures at exact epochs is on the grid as well, but its intervals are all alike:
     what shows truncation is intervals that alternate between neighbouring places of the grid.
+    told: stamps before a counter was made continuous, whose range may be no whole number of grains.
     """
     stamp = series.stamp[pace.places]
     if stamp.size < 20:
         return None
-    for grain in GRAINS:
-        if grain <= file_step_ns:
-            return None
-        rest = stamp % grain
-        rest = np.minimum(rest, grain - rest)
-        if float(np.mean(rest <= ROUNDING_NS)) < 0.995:
-            continue
-        if not _alternates(series, pace, grain) or _ticks(stamp, grain):
-            return None
-        if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
-            return None
-        return _grain(series, pace, grain)
-    return None
+    grain = grain_of(stamp if told is None else told[pace.places])
+    if grain <= file_step_ns or not _alternates(series, pace, grain) or _ticks(stamp, grain):
+        return None
+    if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
+        return None
+    return _grain(series, pace, grain)
 
 
 def _shown_by_receipts(series: Series, pace: Cadence, grain: int) -> bool:

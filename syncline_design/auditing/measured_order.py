@@ -294,7 +294,7 @@ def _periods(change: Array) -> Array:
     side = _NEXT // 2
     change = np.where(change > 0.0, change, np.median(change))
     padded = np.concatenate([change[side:0:-1], change, change[-2 : -side - 2 : -1]])
-    return np.maximum(np.median(sliding_window_view(padded, _NEXT), axis=1), 1.0)
+    return np.asarray(np.maximum(np.median(sliding_window_view(padded, _NEXT), axis=1), 1.0))
 
 
 def _fits(change: Array, period: Array) -> Mask:

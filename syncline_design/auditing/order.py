@@ -19,6 +19,7 @@ WEEK_NS: Final = 604_800 * 10**9
 LONGEST_SPIKE: Final = 5  # messages that go back and return
 LEAST_SLIP: Final = 3  # messages
 MOST_SPIKES: Final = 100_000
+_SHARED: Final = 2.0  # messages of one count, and one more: no count is shared
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,13 +68,17 @@ def _stands_alone(stamp: NDArray[np.int64], begin: int, end: int) -> bool:
 
 def _passing(stamp: NDArray[np.int64], zero: Mask) -> Mask:
     """Zeros of a counter that begins anew: the stamp after is the next small count, the one before
-    of the turn before."""
-    usual = float(np.median(np.abs(np.diff(stamp)))) if stamp.size > 1 else 0.0
+    of the turn before.  There are as many as messages share other counts."""
+    change = np.abs(np.diff(stamp))
+    usual = float(np.median(change[change > 0])) if bool(change.any()) else 0.0
+    heads = np.flatnonzero(np.concatenate([[True], change > 0, [True]]))
+    alike = float(np.percentile(np.diff(heads), 90.0)) + 1.0
     out = np.zeros(stamp.size, bool)
     for begin, end in _runs_of(zero):
         anew = begin == 0 or stamp[begin - 1] > 5 * usual
-        if anew and end - begin == 1 and end < stamp.size and 0 < stamp[end] < 2 * usual:
-            out[begin] = True
+        few = end - begin <= (alike if alike > _SHARED else 1)
+        if anew and few and end < stamp.size and 0 < stamp[end] < 2 * usual:
+            out[begin:end] = True
     return out
 
 

@@ -103,9 +103,10 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         raw = disorder.put(raw)
     else:
         found.append(disorder.fault)
+    told = series.stamp
     series = _continuous(series, disorder, found)
     continuous = replace(series, receive=raw.receive)
-    grain = _grain(series, step_ns, found)
+    grain = _grain(series, told, step_ns, found)
     part = None if grain else arrival.arrived_in_part(series, cadence(series))
     arrived = None if grain or part else arrival.stamped_on_arrival(series, cadence(series))
     if part is not None:
@@ -130,7 +131,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         found = [f for f in found if f is not epoch]
         known = known_offset(base, slips.series, False)
     least = max(_coarse(raw), step_ns / NS, grain.size_s if grain is not None else 0.0)
-    moved = without_shifts(slips.series, least_s=least)
+    moved = _but_for_turns(without_shifts(slips.series, least_s=least), found, told)
     series = moved.series
     again = None if unit else epoch_behind_shifts(epoch, series)
     if again is not None and moved.faults:
@@ -215,10 +216,13 @@ def _at_edges(fault: StampFault, disorder: Disorder) -> bool:
     return lost and float(fault.parameters["count"]) < _STRAY * disorder.falls
 
 
-def _grain(series: Series, step_ns: float, found: list[StampFault]) -> grains.Grain | None:
+def _grain(
+    series: Series, told: Nanoseconds, step_ns: float, found: list[StampFault]
+) -> grains.Grain | None:
     series = without_slips(series, None).series  # whole seconds are no whole number of ticks
     pace = cadence(series)
-    grain = grains.truncated(series, pace, step_ns) or grains.packetised(series, pace, step_ns)
+    grain = grains.truncated(series, pace, step_ns, told)
+    grain = grain or grains.packetised(series, pace, step_ns)
     if grain is not None:
         found.append(grain.fault)
     return grain
@@ -255,11 +259,21 @@ def _coarse(raw: Series) -> float:
     """Resolution of the receipts [s]: smaller shifts may be theirs."""
     if raw.receive is None or raw.receive.size < 20:
         return 0.0
-    for grain in grains.GRAINS:
-        rest = raw.receive[:_SAMPLE] % grain
-        if float(np.mean(np.minimum(rest, grain - rest) <= grains.ROUNDING_NS)) > 0.995:
-            return grain / NS
-    return 0.0
+    return grains.grain_of(raw.receive[:_SAMPLE]) / NS
+
+
+def _but_for_turns(moved: Shifts, found: list[StampFault], told: Nanoseconds) -> Shifts:
+    """Without steps of less than a grain that come of a counter whose range is no whole number of
+    the grains that its stamps are cut off to."""
+    grain = grains.grain_of(told)
+    turns = [f.parameters["wrap_s"] for f in found if f.fault == "counter_wrap"]
+    if not grain or all(round(float(turn) * NS) % grain == 0 for turn in turns):
+        return moved
+    kept = [
+        f for f in moved.faults
+        if f.fault != "step" or abs(float(f.parameters["seconds"])) * NS > grain
+    ]  # fmt: skip
+    return replace(moved, faults=tuple(kept))
 
 
 def _last(

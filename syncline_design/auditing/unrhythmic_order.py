@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.arrival import arrived_in_part, stamped_on_arrival
 from syncline_design.auditing.cadence import cadence
 from syncline_design.auditing.grains import packetised, truncated
-from syncline_design.auditing.measured_order import LEAST_MESSAGES, course
+from syncline_design.auditing.measured_order import LEAST_MESSAGES, course, set_by
 from syncline_design.auditing.series import Series
 
 _LITTLE: Final = 0.2  # of an interval
@@ -31,13 +31,16 @@ def order_without_rhythm(series: Series) -> NDArray[np.intp] | None:
         return None
     stamp = series.stamp[places]
     late = (series.receive[places] - stamp).astype(np.float64)
-    away = late - course(late)
+    level = set_by(stamp, series.receive[places])  # a clock that was set, a counter
+    away = late - level
+    away -= course(away)
+    key = stamp + np.round(level).astype(np.int64)
     interval = float(np.ptp(np.percentile(stamp, [5.0, 95.0]))) / (0.9 * places.size)
     nine_in_ten = float(np.subtract(*np.percentile(away, [95.0, 5.0])))
     reach, little = _MOST_LATE * nine_in_ten, min(_LITTLE * interval, nine_in_ten)
     for deepest in (reach, little):
-        sorted_ = _in_order(stamp, np.abs(away) <= reach, deepest, little)
-        if sorted_ is None:
+        sorted_ = _in_order(key, np.abs(away) <= reach, deepest, little)
+        if sorted_ is None or _falls(stamp[sorted_]) >= _falls(stamp):
             continue
         order = np.arange(series.stamp.size)
         order[places] = places[sorted_]
@@ -47,18 +50,22 @@ def order_without_rhythm(series: Series) -> NDArray[np.intp] | None:
 
 
 def _in_order(
-    stamp: NDArray[np.int64], usual: NDArray[np.bool_], deepest: float, little: float
+    key: NDArray[np.int64], usual: NDArray[np.bool_], deepest: float, little: float
 ) -> NDArray[np.intp] | None:
-    """Messages sorted that lie behind usual ones by no more than `deepest` [ns], and are usual
-    themselves or lie behind by a little."""
-    newest = np.maximum.accumulate(np.where(usual, stamp, stamp.min()))
-    behind = newest - stamp
+    """Messages sorted by when they were measured [ns] that lie behind usual ones by no more than
+    `deepest` [ns], and are usual themselves or lie behind by a little."""
+    newest = np.maximum.accumulate(np.where(usual, key, key.min()))
+    behind = newest - key
     moved = (behind > 0) & (behind <= np.where(usual, deepest, little))
     if not moved.any():
         return None
     # all others stay where they are: between those that came before and after them
-    order = np.argsort(np.where(moved, stamp, newest), kind="stable")
+    order = np.argsort(np.where(moved, key, newest), kind="stable")
     return order if bool(np.any(order != np.arange(order.size))) else None
+
+
+def _falls(stamp: NDArray[np.int64]) -> int:
+    return int(np.count_nonzero(np.diff(stamp) < 0))
 
 
 def _explained(series: Series, order: NDArray[np.intp]) -> bool:
