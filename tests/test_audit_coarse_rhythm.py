@@ -113,3 +113,37 @@ def test_every_message_is_numbered_as_it_was_measured(rate: float) -> None:
 def test_what_has_no_rhythm_is_not_counted() -> None:
     rng = generator((5,))
     assert counted(np.sort(rng.uniform(0.0, LENGTH_S, 1500)), TICK_S) is None
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+@pytest.mark.parametrize("rate", [9.7, 53.0, 137.0])
+@pytest.mark.parametrize("ppm", [80.0, -80.0, 0.0])
+def test_drift_of_less_than_a_tick_is_named_beside_ticks(
+    kind: str, rate: float, ppm: float
+) -> None:
+    """80 ppm are 6 ms over the log; the grid here is of 10 ms, packets come every 16."""
+    when, _ = measured(rate, gap=False, share=0.0, seed=31)
+    rng = generator((31, int(rate)))
+    if kind == "packetised":
+        stamp, receive = in_packets(when, 31)
+        stamp = stamp * (1.0 + 1e-6 * ppm)
+    else:
+        stamp = np.floor(when * (1.0 + 1e-6 * ppm) / 0.01) * 0.01
+        receive = np.maximum.accumulate(when + rng.gamma(2.0, 1e-3, when.size) + 5e-3)
+    one = of(stamp, receive)
+    assert set(named(one)) == ({kind, "drift"} if ppm else {kind})
+    if ppm:
+        assert named(one)["drift"].parameters["ppm"] == pytest.approx(ppm, abs=3.0)
+    assert one.residual.bound == pytest.approx(np.ptp(receive - when), rel=0.05)
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+def test_latency_that_breathes_beside_ticks_is_no_drift(kind: str) -> None:
+    when, _ = measured(53.0, gap=False, share=0.0, seed=32)
+    stamp, receive = in_packets(when, 32)
+    if kind != "packetised":
+        stamp = np.floor(when / 0.01) * 0.01
+        receive = when + generator(32).gamma(2.0, 1e-3, when.size) + 5e-3
+    breathing = 3e-3 * np.sin(2.0 * np.pi * when / 50.0)
+    one = of(stamp, np.maximum.accumulate(receive + breathing))
+    assert set(named(one)) == {kind}

@@ -126,7 +126,7 @@ def _but_for_holes(when: Array, tick_s: float) -> Counted | None:
         return None
     lost = np.zeros(interval.size)
     longest = max(np.split(when, holes + 1), key=lambda piece: piece.size)
-    period = _best_period(longest, np.arange(longest.size, dtype=np.float64))
+    period = best_period(longest, np.arange(longest.size, dtype=np.float64))
     for hole in holes:
         left, right = when[max(0, hole + 1 - _BESIDE) : hole + 1], when[hole + 1 :][:_BESIDE]
         number = np.concatenate([np.arange(left.size), left.size + np.arange(right.size)])
@@ -137,7 +137,7 @@ def _but_for_holes(when: Array, tick_s: float) -> Counted | None:
         after = number >= left.size
         lost[hole] = min(ways, key=lambda n: _reach(both, number + n * after, period))
     found = _with(lost, period, tick_s)
-    found = replace(found, period_s=_best_period(when, found.number))
+    found = replace(found, period_s=best_period(when, found.number))
     return found if float(np.ptp(found.waits(when))) <= _FULL * tick_s else None
 
 
@@ -145,7 +145,7 @@ def _reach(when: Array, number: Array, period: float) -> float:
     return float(np.ptp(when - period * number))
 
 
-def _best_period(when: Array, number: Array) -> float:
+def best_period(when: Array, number: Array) -> float:
     """The interval [s] with which waits of numbered messages reach least far: a convex search."""
     steps = float(number[-1] - number[0])
     first = float(when[-1] - when[0]) / steps

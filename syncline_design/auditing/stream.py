@@ -17,6 +17,7 @@ from syncline_design.auditing.cadence import (
     missing,
 )
 from syncline_design.auditing.clock_shapes import Shape
+from syncline_design.auditing.coarse_drift import drift_behind
 from syncline_design.auditing.coarse_rhythm import counted_behind
 from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.disorder import Disorder, disorder_of
@@ -132,6 +133,10 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         known = known_offset(base, slips.series, False)
     least = max(_coarse(raw), step_ns / NS, grain.size_s if grain is not None else 0.0)
     moved = _but_for_turns(without_shifts(slips.series, least_s=least), found, told)
+    if grain is not None and not any(f.fault == "drift" for f in moved.faults):
+        names = {f.fault for f in found}
+        series, slow = drift_behind(moved.series, names, grain.size_s, _coarse(raw))
+        moved = replace(moved, series=series, faults=(*moved.faults, *slow))
     series = moved.series
     again = None if unit else epoch_behind_shifts(epoch, series)
     if again is not None and moved.faults:

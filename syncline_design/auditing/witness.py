@@ -167,12 +167,12 @@ def drifts(
     left = [k for k in (*slow, *jumps) if sides_of[k] != "stamp"]
     others = tuple(s for k, s in enumerate(shapes) if k not in left)
     time_s, low = blocks.time_s[blocks.usable], blocks.low_s[blocks.usable]
-    straight = _straight(time_s, low - course(others, time_s), blocks.noise_s)
+    line = straight(time_s, low - course(others, time_s), blocks.noise_s)
     whole = course(tuple(shapes[k] for k in left), time_s)
     rate = np.abs(np.diff(whole) / np.diff(time_s))
     only_bends = all(shapes[k].kind in ("bend", "drift") for k in left)
-    steady = straight and only_bends and float(rate.max(initial=0.0)) < _OSCILLATOR
-    return straight, steady
+    steady = line and only_bends and float(rate.max(initial=0.0)) < _OSCILLATOR
+    return line, steady
 
 
 def wander(found: Witness | None, own: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape, ...]:
@@ -232,7 +232,7 @@ def _alike(one: Array, other: Array) -> bool:
     return float(np.std(one - other)) < _SAME * float(np.std(one))
 
 
-def _straight(time_s: Array, level_s: Array, noise_s: float) -> bool:
+def straight(time_s: Array, level_s: Array, noise_s: float) -> bool:
     """Whether levels run along a line rather than to and fro."""
     parts = np.array_split(np.arange(time_s.size), min(_PARTS, time_s.size))
     when = np.asarray([float(time_s[p].mean()) for p in parts])
