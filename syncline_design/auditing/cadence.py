@@ -41,7 +41,7 @@ _HOLE: Final = 0.85  # of an interval: more than a late message
 _WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
 _AS_EVER: Final = 0.5  # of a hole's messages that are not missing among receipts
 _IN_A_ROW: Final = 8  # intervals that are lengthened alike: no chance losses
-_NEXT: Final = 2  # intervals on each side
+_NEXT: Final = 8  # intervals on each side: by chance not all of them hold a loss as well
 _BEYOND: Final = 1.5  # of the shortest about it: less is no hole
 
 
@@ -206,7 +206,7 @@ def missing(
 
 
 def _about(interval: Array) -> Array:
-    """The shortest of the four intervals about each: a sensor that measures ever faster, or less
+    """The shortest of the intervals about each: a sensor that measures ever faster, or less
     often for a while, leaves out nothing."""
     ends = np.full(_NEXT, np.inf)
     near = np.lib.stride_tricks.sliding_window_view(
