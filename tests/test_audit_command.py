@@ -190,6 +190,37 @@ def test_the_residual_is_written_into_a_spec_on_request_and_marked(
     assert run(folder / "gnss.csv", "--write-spec", out).exit_code == 2
 
 
+@pytest.mark.parametrize("other", [True, False])
+def test_a_role_that_is_stamped_in_hardware_keeps_its_error(tmp_path: Path, other: bool) -> None:
+    """Receipts show transport: 4 ms here, of stamps that the spec knows to 10 ns."""
+    import yaml
+
+    spec, out = tmp_path / "a.yaml", tmp_path / "b.yaml"
+    error = "timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}"
+    spec.write_text(
+        "syncline: 1\nname: a\nrequirements: [{id: A, kind: accuracy, limit: 10 m}]\n"
+        "stages:\n  - name: car\n"
+        "    platform: {v_max: 20 m/s, omega_max: 40 deg/s, distance: 1 m, baseline: 1 m}\n"
+        "    position: {sensor: ublox_f9p_rtk, primitive: arrival, timestamping: arrival}\n"
+        "    attitude:\n      sensor: {modality: attitude, type: ins, primitives: [pps],\n"
+        f"        sigma_attitude: 0.1 deg}}\n      primitive: pps\n      {error}\n",
+        "utf-8",
+    )  # fmt: skip
+    delay = np.random.default_rng(6).uniform(1e-3, 5e-3, 99)
+    rows = [f"{1_750_000_000 + k / 10:.3f},{1_750_000_000 + k / 10 + delay[k]:.6f}"
+            for k in range(99)]  # fmt: skip
+    files = [tmp_path / f"{name}.csv" for name in (("attitude", "gnss") if other else ["attitude"])]
+    for path in files:
+        path.write_text("\n".join(["stamp_s,receive_s", *rows, ""]), "utf-8")
+    found = run(*files, "--spec", spec, "--write-spec", out)
+    assert "car.attitude: stamped in hardware" in found.stderr
+    assert out.exists() == other
+    if other:
+        stage = yaml.safe_load(out.read_text("utf-8"))["stages"][0]
+        assert stage["attitude"]["timestamping"] == yaml.safe_load(error)["timestamping"]
+        assert stage["position"]["timestamping"]["error"]["high"] == "0 s"
+
+
 @pytest.mark.parametrize(("names", "taken"), [
     (("attitude", "imu"), "attitude"), (("imu", "ins"), None), (("imu",), "imu"),
 ])  # fmt: skip

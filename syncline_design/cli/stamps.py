@@ -72,12 +72,17 @@ def audit(
 
 
 def _write(found: Audit, case: Case, path: Path) -> None:
-    from syncline_design.comparison.stamp_meaning import spec_with_residuals
+    from syncline_design.comparison.stamp_meaning import keeping_theirs, spec_with_residuals
     from syncline_design.spec.edit import write_spec
 
+    kept = keeping_theirs(found)
+    if kept:
+        say(f"{', '.join(kept)}: stamped in hardware, of which receipts say nothing; timestamping "
+            "as the spec has it")  # fmt: skip
     text = spec_with_residuals(found, case)
     if text is None:
-        say("no stream with a residual plays a role of the spec: no spec written")
+        say("no stream whose receipts say something of its stamps plays a role of the spec: no "
+            "spec written")  # fmt: skip
         return
     write_spec(text, path)
     say(f"spec with the residuals written to {path}")

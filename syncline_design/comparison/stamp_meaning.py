@@ -152,12 +152,13 @@ def _held(row: StreamAudit, played: Played | None) -> StreamAudit:
 def spec_with_residuals(audit: Audit, case: Case) -> str | None:
     """The spec with each residual as its role's timestamp error; None where there is none.
 
-    A stamp on arrival is late: the measurement was valid at t + mu, mu in [-bound, 0].
+    Roles that are stamped in hardware keep theirs (`keeping_theirs`).  A stamp on arrival is late:
+    the measurement was valid at t + mu, mu in [-bound, 0].
     """
     errors: list[tuple[int, RoleName, float, str]] = []
     for row in audit.streams:
         bound = row.residual_s.bound
-        if row.role is None or bound is None:
+        if row.role is None or bound is None or row.error_m is None:
             continue
         stage, _, role = row.role.rpartition(".")
         index = next(k for k, one in enumerate(case.spec.stages) if one.name == stage)
@@ -165,6 +166,12 @@ def spec_with_residuals(audit: Audit, case: Case) -> str | None:
     if not errors:
         return None
     return with_timestamping_text(case, errors)
+
+
+def keeping_theirs(audit: Audit) -> tuple[str, ...]:
+    """Roles whose stamps receipts say nothing of, as the design takes them in hardware."""
+    rows = (row for row in audit.streams if row.residual_s.bound is not None)
+    return tuple(row.role for row in rows if row.role is not None and row.error_m is None)
 
 
 def _mended(row: StreamAudit) -> str:
