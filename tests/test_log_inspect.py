@@ -140,6 +140,9 @@ def test_what_cannot_be_read_ends_with_two_and_writes_nothing(tmp_path: Path) ->
     code, out, said = run("log", "inspect", bad, "--spec", own, "--write-spec", mapped)
     assert (code, mapped.exists()) == (2, False)
     assert "no log that can be read" in said
+    listed = tmp_path / "listed.json"
+    code, out, said = run("log", "inspect", bad, "--output", f"json:{listed}")
+    assert (code, out, listed.exists()) == (2, "", False)
     code, out, said = run("log", "inspect", bag, bad)
     assert code == 2
     assert "/odom" in out  # what could be read is shown all the same

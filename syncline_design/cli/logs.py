@@ -66,6 +66,8 @@ def inspect(
             ONE_STAGE if case is None else [stage.name for stage in case.spec.stages],
         )
     say_unreadable(found.unreadable)
+    if not found.streams and found.unreadable:
+        return found.exit_code  # nothing was read, nothing is written
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
     emit(console(on_log(found)), targets, lambda name: render_log(name, found), quiet=quiet)
