@@ -225,3 +225,31 @@ def test_a_clock_that_is_set_again_and_again_is_one_fault(tmp_path: Path) -> Non
     assert steps[0].parameters["seconds"] == pytest.approx(-2.7e-4, rel=0.05)
     assert steps[0].parameters["interval_s"] == pytest.approx(3.365, rel=0.02)
     assert steps[0].parameters["count"] == 26
+
+
+# ---- receipts on a host's ticks ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_beat_with_a_hosts_tick_is_no_drift_though_some_messages_miss_one(
+    tmp_path: Path, seed: int
+) -> None:
+    """50 Hz, 8.4 ppm slow against a scheduler of 5 ms; one message in sixteen misses a tick."""
+    rng = np.random.default_rng(seed)
+    t = 0.0171 + 0.02 * (1.0 - 8.4e-6) * np.arange(3750)
+    missed = 0.005 * rng.choice([0, 1, 2], t.size, p=[0.94, 0.05, 0.01])
+    came = t + 1e-3 + rng.gamma(2.0, 2e-5, t.size) + missed
+    receive = np.ceil(came / 0.005) * 0.005 + rng.uniform(0.0, 1e-3, t.size)
+    row = said(tmp_path, t, np.maximum.accumulate(receive))
+    assert not found(row)
+
+
+def test_a_drift_beside_rare_long_delays_stays_one(tmp_path: Path) -> None:
+    """The same delays on no tick, of a clock that is 30 ppm fast."""
+    rng = np.random.default_rng(9)
+    t = even(50.0, 75.0)
+    missed = rng.choice([0.0, 1.0], t.size, p=[0.94, 0.06]) * rng.uniform(3e-3, 12e-3, t.size)
+    receive = np.maximum.accumulate(t + 4e-3 + rng.uniform(0.0, 1e-3, t.size) + missed)
+    row = said(tmp_path, t * (1.0 + 30e-6), receive)
+    assert set(found(row)) == {"drift"}
+    assert found(row)["drift"].parameters["ppm"] == pytest.approx(30.0, abs=2.0)

@@ -342,12 +342,17 @@ def _beat(pace: Cadence, interval: Array) -> float | None:
 
 def best_timer(when: Array) -> float | None:
     """The timer that all moments are ticks of; the longest of those that fit best."""
+    return next(iter(timers(when)), None)
+
+
+def timers(when: Array) -> tuple[float, ...]:
+    """Those that all moments are ticks of, fitting about as well, the longest first."""
     when = when[:_MOST_MOMENTS]
     fits = {t: _coherence(when, t) for t in TIMERS}
     best = max(fits.values())
     if best < _COHERENT:
-        return None
-    return max(t for t, c in fits.items() if c > best - 0.03)
+        return ()
+    return tuple(sorted((t for t, c in fits.items() if c > best - 0.03), reverse=True))
 
 
 def _coherence(when: Array, period: float) -> float:

@@ -16,7 +16,7 @@ from syncline_design.auditing import witness
 from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
 from syncline_design.auditing.clock_shapes import Shape, course
-from syncline_design.auditing.grains import best_timer
+from syncline_design.auditing.grains import timers
 from syncline_design.auditing.jumps import Jump, without_jumps
 from syncline_design.auditing.levels import believed, polished, shapes_of
 from syncline_design.auditing.naming import all_named
@@ -29,6 +29,8 @@ from syncline_design.machine.quick_dataclass import dataclass
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
 _OTHER_TICKS: Final = 3  # receipts that show a tick
+_MOST_OF_TICK: Final = 0.5  # that waits fill, where whole ticks are to be told from others
+_MET: Final = 0.8  # of those that missed a tick; by chance at most half
 _OTHER_RATE: Final = 0.3  # of an interval
 _LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
 
@@ -200,14 +202,30 @@ def _ticks_of(series: Series, late: Array) -> float:
     assert series.receive is not None
     receive = np.sort(series.receive[series.good])
     when = seconds(receive - receive[0])
-    tick = best_timer(when)
-    if tick is None or _has_tail(late):
-        return 0.0
-    counts = np.round(np.diff(when) / tick)
+    kept = (t for t in timers(when) if not _has_tail(_within_tick(late, t)) and _shows(when, t))
+    return next(kept, 0.0)
+
+
+def _shows(when: Array, tick_s: float) -> bool:
+    """Whether some receipts come whole ticks sooner or later than usual."""
+    counts = np.round(np.diff(when) / tick_s)
     values, often = np.unique(counts, return_counts=True)
     usual = values[int(np.argmax(often))]
     whole = counts % usual == 0.0 if usual > 0.0 else np.zeros(counts.size, bool)
-    return tick if int(np.sum(~whole | (counts == 0.0))) >= _OTHER_TICKS else 0.0
+    return int(np.sum(~whole | (counts == 0.0))) >= _OTHER_TICKS
+
+
+def _within_tick(late: Array, tick_s: float) -> Array:
+    """Delays without whole ticks, where those that are longer are so by whole ticks: messages that
+    missed one, and no tail of transport."""
+    turns = np.round((late - float(np.median(late))) / tick_s)
+    folded = late - turns * tick_s
+    usual = np.percentile(folded[turns == 0.0], [1.0, 99.0])
+    missed = folded[turns != 0.0]
+    if missed.size < _OTHER_TICKS or float(np.ptp(usual)) > _MOST_OF_TICK * tick_s:
+        return late
+    met = float(np.mean((missed >= usual[0]) & (missed <= usual[1])))
+    return folded if met > _MET else late
 
 
 def _has_tail(late: Array) -> bool:
