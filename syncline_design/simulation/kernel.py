@@ -1,5 +1,5 @@
 """The chain component by component: the same equations as `chain.stage_error`, about ten times
-faster, for level vehicles (roll = pitch = 0, any yaw) that move with constant twist.
+faster, for vehicles that move with constant twist, level (roll = pitch = 0, any yaw) or leaning.
 
 Everything is (3, n) or (n,): each row of an array is contiguous, so a chunk that fits the cache
 is worked through at the speed of the cache.  Sines of draws never appear: a uniform angle comes
@@ -56,10 +56,52 @@ def stage_error(draw: Draw, carried_m: Array | None = None) -> Array:
     e = dp + (R_p - I) l_G + l_G + R_hat (l_L - l_G + r_hat n_hat) - l_L - r n, then yaw, then the
     position noise and the error of the chain before.
     """
-    level = _antenna_shift(draw)
-    level += draw.antenna_m - draw.ranging_m
-    level -= draw.range_m * draw.bearing
-    level += _believed_object(draw)
+    level = _fixed(draw)
+    level += _believed_object(draw, None)
+    return _headed(draw, level, carried_m)
+
+
+def leaning_error(draw: Draw, lean_rad: Array, carried_m: Array | None = None) -> Array:
+    """The same of vehicles that roll and pitch (2, n) [rad], beneath their yaw.
+
+    With R' = Ry(pitch) Rx(roll) both parts are turned, and the measured attitude is that of
+    R' exp(S(t)) with its noise added to roll, pitch and yaw.
+    """
+    lean = Lean(np.sin(lean_rad), np.cos(lean_rad))
+    level = lean.turned(_fixed(draw))
+    level += _believed_object(draw, lean)
+    return _headed(draw, level, carried_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Lean:
+    """Sines and cosines (2, n) of roll and pitch."""
+
+    sine: Array
+    cosine: Array
+
+    def turned(self, vector: Array) -> Array:
+        """Ry(pitch) Rx(roll) u, in place, (3, n)."""
+        turn_columns(vector, 0, self.sine[0], self.cosine[0])
+        turn_columns(vector, 1, self.sine[1], self.cosine[1])
+        return vector
+
+    def down(self) -> Array:
+        """The level's down axis as the body has it (3, n): the last row of R'."""
+        (sr, sp), (cr, cp) = self.sine, self.cosine
+        return np.stack([-sp, cp * sr, cp * cr])
+
+
+def _fixed(draw: Draw) -> Array:
+    """What no measured attitude turns: antenna while shifted, less where it and the object are."""
+    fixed = _antenna_shift(draw)
+    fixed += draw.antenna_m - draw.ranging_m
+    fixed -= draw.range_m * draw.bearing
+    return fixed
+
+
+def _headed(draw: Draw, level: Array, carried_m: Array | None) -> Array:
+    """The error (3, n), NED, of one in level axes: by yaw, then noise and what was before."""
     error = np.empty_like(level)
     np.multiply(draw.cos_yaw, level[0], out=error[0])
     error[0] -= draw.sin_yaw * level[1]
@@ -176,13 +218,13 @@ def _square(vector: Array) -> Array:
     return square
 
 
-def _believed_object(draw: Draw) -> Array:
+def _believed_object(draw: Draw, lean: Lean | None) -> Array:
     """R_hat (l_L - l_G + r_hat n_hat), level axes, (3, n)."""
     sine, cosine = sin_cos(draw.angle_noise_rad)
     vector = _measured_bearing(draw.bearing, sine[3:], cosine[3:])
     vector *= draw.range_m + draw.range_noise_m
     vector += draw.ranging_m - draw.antenna_m
-    for axis, (sin_angle, cos_angle) in enumerate(_measured_attitude(draw, sine, cosine)):
+    for axis, (sin_angle, cos_angle) in enumerate(_measured_attitude(draw, lean, sine, cosine)):
         turn_columns(vector, axis, sin_angle, cos_angle)
     return vector
 
@@ -241,13 +283,50 @@ def attitude_angles(turn: Array) -> tuple[tuple[Array, Array], ...]:
     return (r21 * scale, r22 * scale), (-r20, cos_pitch), (r10 * scale, r00 * scale)
 
 
-def _measured_attitude(draw: Draw, sine: Array, cosine: Array) -> tuple[tuple[Array, Array], ...]:
+def _measured_attitude(
+    draw: Draw, lean: Lean | None, sine: Array, cosine: Array
+) -> tuple[tuple[Array, Array], ...]:
     """(sin, cos) of the measured roll, pitch and yaw (yaw less the true one)."""
     turn = draw.rate_radps * (draw.mu_attitude_s - draw.mu_ranging_s)
+    angles = attitude_angles(turn) if lean is None else _leaning_angles(turn, lean)
     return tuple(
         (s * cosine[k] + c * sine[k], c * cosine[k] - s * sine[k])
-        for k, (s, c) in enumerate(attitude_angles(turn))
+        for k, (s, c) in enumerate(angles)
     )
+
+
+def _leaning_angles(turn: Array, lean: Lean) -> tuple[tuple[Array, Array], ...]:
+    """(sin, cos) of roll, pitch and yaw of R' exp(S(t)), t (3, n) [rad]; see `attitude_angles`.
+
+    Its last row is that of R' turned by -t, its first column that of exp(S(t)) turned by R'.
+    """
+    terms = rotation_terms(_square(turn), 2)
+    x, y, z = _turned(lean.down(), -turn, terms)
+    first = lean.turned(_turned(np.array([[1.0], [0.0], [0.0]]), turn, terms))
+    cos_pitch = np.sqrt(y * y + z * z)
+    locked = cos_pitch < _GIMBAL_LOCK
+    scale = 1.0 / np.where(locked, 1.0, cos_pitch)
+    roll, yaw = (y * scale, z * scale), (first[1] * scale, first[0] * scale)
+    if np.any(locked):
+        second = lean.turned(_turned(np.array([[0.0], [1.0], [0.0]]), turn, terms))
+        level = np.where(locked, np.hypot(second[0], second[1]), 1.0)
+        roll = np.where(locked, 0.0, roll[0]), np.where(locked, 1.0, roll[1])
+        yaw = (
+            np.where(locked, -second[0] / level, yaw[0]),
+            np.where(locked, second[1] / level, yaw[1]),
+        )
+    return roll, (-x, cos_pitch), yaw
+
+
+def _turned(vector: Array, turn: Array, terms: tuple[Array, ...]) -> Array:
+    """exp(S(t)) u = u + t x (A u + B t x u), A and B of `rotation_terms`, (3, n)."""
+    a, b = terms
+    inner = cross(turn, vector)
+    inner *= b
+    inner += a * vector
+    found = cross(turn, inner)
+    found += vector
+    return found
 
 
 def turn_columns(vector: Array, axis: int, sine: Array, cosine: Array) -> None:

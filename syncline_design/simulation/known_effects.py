@@ -32,6 +32,20 @@ def level_error(draw: kernel.Draw, before: Carried | None) -> Carried:
     return Carried(error, _NO_SHIFT)
 
 
+def leaning_error(draw: kernel.Draw, lean_rad: Array, before: Carried | None) -> Carried:
+    """The same of vehicles that roll and pitch (2, n) [rad]; sight and yaw may be of any length."""
+    length = np.sqrt(draw.cos_yaw**2 + draw.sin_yaw**2)
+    sight = kernel.norm(draw.bearing)
+    unit = replace(
+        draw,
+        cos_yaw=draw.cos_yaw / length,
+        sin_yaw=draw.sin_yaw / length,
+        bearing=draw.bearing / np.where(sight > 0.0, sight, 1.0),
+    )
+    error = kernel.leaning_error(unit, lean_rad, None if before is None else before.error_m)
+    return Carried(error, _NO_SHIFT)
+
+
 def placed_error(
     draw: kernel.Draw,
     around: tuple[Moment, Array],

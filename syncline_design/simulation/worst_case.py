@@ -132,7 +132,11 @@ class _Search:
             if moment is None:
                 carried = known_effects.level_error(draw, carried)
                 continue
-            where = (moment, leaning(self.system.horizon, picked["lean"]))
+            lean = leaning(self.system.horizon, picked["lean"])
+            if not self.acting:
+                carried = known_effects.leaning_error(draw, lean, carried)
+                continue
+            where = (moment, lean)
             acting = self.acting.get(stage.name, ())
             carried = known_effects.placed_error(draw, where, acting, None, carried)
         assert carried is not None
