@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from syncline_design.auditing.result import StreamAudit
-from tests.test_audit_transport import even, found, said
+from tests.test_audit_transport import even, found, queued, said
 
 FRAME = 1e-3
 
@@ -156,3 +156,16 @@ def test_lost_messages_of_a_drifting_clock_are_no_waits_for_a_turn(tmp_path: Pat
     assert set(found(row)) == {"drift", "lost_messages"}
     assert not hides(row, "wait")
     assert row.residual_s.bound == pytest.approx(np.ptp(delay[kept]), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_step_of_arrivals_is_one_step(tmp_path: Path, seed: int) -> None:
+    """25 ms, of stamps that scatter by 2 ms: its size is known to some us, and what is left of it
+    is no second one."""
+    rng = np.random.default_rng(seed)
+    t = even(9.7, 120.0)
+    came = queued(t, 1e-3, seed)
+    stamp = came + np.where(t > 54.0, 0.025, 0.0)
+    row = said(tmp_path, stamp, np.maximum.accumulate(came + rng.gamma(2.0, 3e-5, t.size)))
+    assert sorted(f.fault for f in row.faults) == ["stamped_on_arrival", "step"]
+    assert found(row)["step"].parameters["seconds"] == pytest.approx(0.025, abs=5e-5)

@@ -147,3 +147,22 @@ def test_latency_that_breathes_beside_ticks_is_no_drift(kind: str) -> None:
     breathing = 3e-3 * np.sin(2.0 * np.pi * when / 50.0)
     one = of(stamp, np.maximum.accumulate(receive + breathing))
     assert set(named(one)) == {kind}
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+@pytest.mark.parametrize("rate", [9.7, 53.0])
+def test_messages_that_come_twice_where_no_two_share_a_tick(kind: str, rate: float) -> None:
+    """Sensors slower than the tick (16 ms, 10 ms): two messages with one stamp are one message."""
+    when, _ = measured(rate, gap=False, share=0.0, seed=33)
+    stamp, receive = in_packets(when, 33)
+    if kind != "packetised":
+        stamp = np.floor(when / 0.01) * 0.01
+        receive = when + generator(33).gamma(2.0, 1e-3, when.size) + 5e-3
+    again = np.sort(generator(34).choice(np.arange(50, when.size - 50), 15, replace=False))
+    one = of(
+        np.insert(stamp, again + 1, stamp[again]),
+        np.maximum.accumulate(np.insert(receive, again + 1, receive[again] + 1e-4)),
+    )
+    assert set(named(one)) == {kind, "duplicates"}
+    assert named(one)["duplicates"].parameters["count"] == 15.0
+    assert one.residual.bound == pytest.approx(np.ptp(receive - when), rel=0.1)

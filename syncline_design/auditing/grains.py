@@ -24,6 +24,8 @@ TIMERS: Final = (0.016, 0.008, 0.004, 0.005, 0.01, 0.02, 0.0125, 0.025, 0.032, 0
 FTDI_S: Final = 0.016
 _FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _MOST_MOMENTS: Final = 200_000
+_ALONE: Final = 1.15  # ticks between messages, from which on no two of them share one
+_FAR: Final = 5.0  # ticks: what is longer is a gap or a jump
 _LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
 _REACH: Final = 0.6  # of a grain, by receipts
 _MOST_OF: Final = 0.9  # of what receipts of one grain lie apart
@@ -206,6 +208,7 @@ def _strictly(counts: Array) -> bool:
 def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
     stamp = series.stamp[pace.places]
     same = int(np.sum(np.diff(stamp) == 0))
+    same = same if _share_ticks(np.diff(stamp).astype(np.float64), grain) else 0
     twice = Consequence("duplicates", {"count": float(same)},
                         f"{same} messages within the resolution of the one before")  # fmt: skip
     size = grain / NS
@@ -217,6 +220,12 @@ def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
         (twice,) if same else (),
     )  # fmt: skip
     return Grain(fault, size, same > 0)
+
+
+def _share_ticks(interval: Array, tick: float) -> bool:
+    """Whether two messages may carry one tick; where they come less often equal stamps are
+    repeated ones."""
+    return float(np.mean(np.clip(interval, 0.0, _FAR * tick))) < _ALONE * tick
 
 
 def packetised(series: Series, pace: Cadence, file_step_ns: float = 1.0) -> Grain | None:
@@ -366,7 +375,7 @@ def _coherence(when: Array, period: float) -> float:
 def _packets(
     series: Series, interval: Array, grid: float, sure: bool, size: float, pace: Cadence
 ) -> Grain:
-    same = int(np.sum(interval == 0.0))
+    same = int(np.sum(interval == 0.0)) if _share_ticks(interval, grid) else 0
     twice = Consequence("duplicates", {"count": float(same)},
                         f"{same} messages share their packet's stamp")  # fmt: skip
     known = " (the latency timer of FTDI's serial chips)" if abs(grid - 0.016) < 1e-5 else ""

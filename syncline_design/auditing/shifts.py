@@ -27,6 +27,7 @@ from syncline_design.auditing.witness import Side
 from syncline_design.machine.quick_dataclass import dataclass
 
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
+_REST: Final = 0.02  # of a jump: how well its size is known at once
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
 _OTHER_TICKS: Final = 3  # receipts that show a tick
 _MOST_OF_TICK: Final = 0.5  # that waits fill, where whole ticks are to be told from others
@@ -72,7 +73,34 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     late = late - np.median(late)
     own = tuple(_shift_of(jump, time_s) for jump in mended.jumps)
     moved = _slow_shifts(series, places, time_s, late, least_s, mended.settling_s)
-    return replace(moved, faults=(*mended.faults, *moved.faults), shifts=(*own, *moved.shifts))
+    near_s = 2.0 * moved.blocks.length_s if moved.blocks is not None else 0.0
+    faults = _joined(mended.faults, moved.faults, near_s)
+    return replace(moved, faults=faults, shifts=(*own, *moved.shifts))
+
+
+def _joined(
+    jumps: tuple[StampFault, ...], slow: tuple[StampFault, ...], near_s: float
+) -> tuple[StampFault, ...]:
+    """Both, but for steps beside a jump that are what its size was off by."""
+    kept = list(jumps)
+    rest: list[StampFault] = []
+    for fault in slow:
+        k = next((k for k, jump in enumerate(kept) if _is_rest(fault, jump, near_s)), None)
+        if k is None:
+            rest.append(fault)
+            continue
+        size = float(kept[k].parameters["seconds"]) + float(fault.parameters["seconds"])
+        kept[k] = replace(kept[k], parameters={**kept[k].parameters, "seconds": size})
+    return (*kept, *rest)
+
+
+def _is_rest(fault: StampFault, jump: StampFault, near_s: float) -> bool:
+    if fault.fault != "step" or jump.fault != "step" or "interval_s" in jump.parameters:
+        return False
+    begins = fault.from_s is not None and jump.from_s is not None
+    near = begins and abs((fault.from_s or 0.0) - (jump.from_s or 0.0)) <= near_s
+    share = abs(float(fault.parameters["seconds"]) / float(jump.parameters["seconds"]))
+    return near and share < _REST
 
 
 def _shift_of(jump: Jump, time_s: Array) -> Shift:
