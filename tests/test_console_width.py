@@ -88,5 +88,20 @@ def test_columns_give_way_at_words_and_figures_stay_with_their_units() -> None:
     ]
 
 
+def test_rows_become_records_where_those_take_fewer_lines() -> None:
+    """A sentence in a column as wide as its longest word: a dozen lines a row."""
+    why = "chosen for least cost of the whole design; 8 options ruled out before"
+    shown = table(
+        "T", ("Role", "Sensor", "Primitive", "Timestamping", "Timeline", "Cost #", "Why"),
+        [("uav position", "u-blox F9P", "1PPS input", "Interrupt on a Linux GPIO", "host clock",
+          "32 020.00 EUR".replace(" ", "\u00a0"), why)] * 3,
+    )  # fmt: skip
+    lines = list(fitted(shown, 78))
+    assert len(lines) == 3 * len(shown.heads)
+    assert max(map(len, lines)) == len(f"  Why: {why}")
+    assert next(fitted(shown, 200)).split()[0] == "Role"
+    assert len(list(fitted(shown, 200))) == 4
+
+
 def test_a_word_longer_than_the_line_is_not_broken() -> None:
     assert folded("see /a/very/long/path.yaml now", 10) == ["see", "/a/very/long/path.yaml", "now"]

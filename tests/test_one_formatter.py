@@ -103,6 +103,8 @@ def test_places_keep_their_zeros_and_shares_their_sign() -> None:
     assert [to_places(2.5, 3), to_places(-0.125, 2)] == ["2.500", "-0.12"]
     assert to_places(2.5, 1, sign=True) == "+2.5"
     assert [percent(0.12345), percent(1.0), percent(-0.5)] == ["12.3 %", "100 %", "-50 %"]
+    small = [percent(share) for share in (8.09e-7, 1e-6, 0.0, -8.09e-7)]
+    assert small == ["< 0.0001 %", "0.0001 %", "0 %", "> -0.0001 %"]
 
 
 @pytest.mark.parametrize("text", [to_digits, signed, lambda v: to_places(v, 2)])

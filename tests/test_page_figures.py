@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from diagnosis_samples import CLOSED, diagnosis
 from html_page import Page
 from syncline_design.report import numbers
 from syncline_design.report.axes import log_ticks
+from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
 from syncline_design.report.on_choice import on_choice
+from syncline_design.report.on_diagnosis import NAT, on_diagnosis
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
@@ -85,7 +89,11 @@ def test_a_datasheet_figure_reads_as_it_was_written() -> None:
     for told in (" ".join(said.split()), " ".join(page.replace("\u00a0", " ").split())):
         assert " ".join(tolerances.text.split()) in told
         for row in found.result.slack or ():
-            assert numbers.si_quantity(row.value, row.unit).replace("\u00a0", " ") in told
+            text = numbers.si_quantity(row.value, row.unit).replace("\u00a0", " ")
+            if row.term.endswith("sensor error"):  # beside a limit of 8 cm
+                text = f"{100.0 * row.value:.4g} cm"
+            assert text.split(" ")[0].rstrip("0").rstrip(".") in told
+            assert text.split(" ")[1] in told
 
 
 @pytest.mark.parametrize(
@@ -160,3 +168,38 @@ def test_an_assumed_figure_reads_as_its_catalog_writes_it() -> None:
     values = {(one.entry, one.figure): one.value for one in verdict.assumptions or ()}
     assert values["ocxo", "offset"] == "uniform low -1 us high 1 us"
     assert not [value for value in values.values() if "[]" in value]
+
+
+def test_words_of_the_trade_are_explained_where_they_are_first_used() -> None:
+    """Nat, placebo and floor of a diagnosis, on the console and on the page."""
+    placebo = replace(CLOSED, added="azimuth bias (ranging)")
+    found = diagnosis()
+    found = replace(found, gap=replace(found.gap, placebo=placebo))
+    for text in (console(on_diagnosis(found), colour=False), Page(html(on_diagnosis(found))).text):
+        said = " ".join(text.split())
+        first = said.index(" nat")
+        assert 0 < said.index("1 nat, the unit of evidence: the log is 2.7 times") - first < 120
+        assert said.index("lacebo") == said.index("A placebo is an effect") + 3
+    page = Page(html(on_diagnosis(found))).text
+    assert "Floor (dashed): the better of what the spec's noise expects" in page
+
+
+def test_a_nat_is_what_is_said_of_it() -> None:
+    assert [round(math.exp(1.0), 1), round(math.exp(5.0))] == [2.7, 148]
+    assert "2.7 times" in NAT
+    assert "148 times" in NAT
+    assert round(math.exp(0.1), 1) == 1.1  # of a sample, in the words on the gap
+
+
+def test_a_diagram_of_clocks_has_names_in_full_where_three_lines_hold_them() -> None:
+    """The longest of a catalog with the longest of its signals; no text outside the figure."""
+    name = "Applanix POS MV OceanMaster with IARTK"
+    method = "Precision Time Protocol with a timing board"
+    sensor = Stamped("uav \u00b7 position", name, "time-of-validity pulse", method, False,
+                     1.208e-5, None, True)  # fmt: skip
+    short = replace(sensor, sensor="SBG", method="GPIO")
+    drawn = clocks([ClockedVehicle("uav", (sensor, short), "a clock", None)])
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", drawn.svg)
+    said = " ".join(texts)
+    assert all(word in said for word in (*name.split(), *method.split(), "pulse"))
+    assert "\u2026" not in said

@@ -8,11 +8,14 @@ from pathlib import Path
 import pytest
 
 import syncline_design as sd
+from clock_logs import tracking, write
 from syncline_design.comparison.acceptance import Acceptance, AcceptedSpec
 from syncline_design.report.document import Document, Facts, Span
 from syncline_design.report.on_acceptance import on_acceptance
+from syncline_design.report.on_audit import on_audit
 from syncline_design.report.on_diff import on_diff
 from syncline_design.report.on_simulation import on_simulation
+from syncline_design.report.on_timing import on_timing
 
 SPECS = Path(__file__).resolve().parent.parent / "specs"
 TRACK = SPECS / "position_track.yaml"
@@ -54,3 +57,31 @@ def test_an_acceptance_is_pinned() -> None:
         version=sd.__version__, seed=0,
     )  # fmt: skip
     assert pins(on_acceptance(result))["Spec, SHA-256"] == HASH
+
+
+def stamps(folder: Path) -> Path:
+    """Messages at 10 Hz that are received a millisecond after their stamps."""
+    rows = [f"{1.7e9 + 0.1 * k:.6f},{1.7e9 + 0.1 * k + 1e-3:.6f}" for k in range(200)]
+    return write(folder / "position.csv", ["stamp_s,receive_s", *rows])
+
+
+def clock(folder: Path) -> Path:
+    """A morning of a clock that is half a microsecond late."""
+    times = [1.7e9 + 16.0 * k for k in range(120)]
+    return write(folder / "tracking.log", tracking(times, [5e-7] * 120))
+
+
+@pytest.mark.parametrize("seed", [0, 7])
+def test_what_is_held_against_a_spec_is_pinned_by_it(tmp_path: Path, seed: int) -> None:
+    wanted = {
+        "Spec file": str(TRACK), "Spec, SHA-256": HASH, "Seed": str(seed),
+        "Catalogs, SHA-256": sd.load(TRACK).catalogs_sha256, "syncline-design": sd.__version__,
+    }  # fmt: skip
+    assert pins(on_audit(sd.audit(stamps(tmp_path), spec=TRACK, seed=seed))) == wanted
+    timed = pins(on_timing(sd.timing(clock(tmp_path), spec=TRACK, seed=seed)))
+    assert wanted.items() <= timed.items()
+
+
+def test_what_no_spec_was_asked_for_is_pinned_by_the_version(tmp_path: Path) -> None:
+    assert pins(on_audit(sd.audit(stamps(tmp_path)))) == {"syncline-design": sd.__version__}
+    assert pins(on_timing(sd.timing(clock(tmp_path)))) == {"syncline-design": sd.__version__}

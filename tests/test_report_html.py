@@ -119,14 +119,14 @@ def as_the_verdict_has_it() -> list[str]:
         verdict.provenance.spec_sha256,
         verdict.warnings[0].message,
         (verdict.choice.excluded or ())[0].reason,
-        (verdict.effects or ())[0].sentence,
+        (verdict.effects or ())[0].sentence.replace(" us", "\u00a0\u00b5s"),
     ]
 
 
 WORDS = (
     "proven optimal",
     "recomputed exactly",
-    "position data are 2 us older than their stamps",
+    "position data are 2\u00a0\u00b5s older than their stamps",
     "Errata of the paper that bear on this design",
     "77.9 deg/s is a rounding of 45 sqrt(3)",
     "2\u00a0000",

@@ -75,7 +75,7 @@ def test_errors_beside_a_limit_stand_in_its_unit() -> None:
     design = replace(DESIGN, before=replace(DESIGN.before, requirements=(limit,)))
     told = console(on_diagnosis(diagnosis(design=design, repairs=(left,)))).replace("\u00a0", " ")
     meant = told[told.index("The error without and with") :]
-    for text in ("0.117 m", "3.94 m", "0.1 m", "0.68 m", "0.6 m to 0.7 m", "0.0934 m"):
+    for text in ("0.117 m", "3.94 m", "0.100 m", "0.68 m", "0.6 m to 0.7 m", "0.0934 m"):
         assert text in meant
     assert " mm" not in meant
     plain = console(on_diagnosis(diagnosis())).replace("\u00a0", " ")

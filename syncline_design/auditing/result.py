@@ -144,6 +144,17 @@ class IncompleteFile(Record):
     messages: int
 
 
+@dataclass(frozen=True, slots=True)
+class AuditedFor(Record):
+    """The spec against which streams were held, by its content, and the seed of its choice."""
+
+    name: str
+    file: str
+    spec_sha256: str
+    catalogs_sha256: str
+    seed: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Audit(Record):
     """All streams of all files.  `incomplete`: the first of the damaged files, `damaged` each."""
@@ -157,6 +168,7 @@ class Audit(Record):
     evidence: tuple[FileRead, ...]
     notes: tuple[str, ...]
     version: str
+    spec: AuditedFor | None = optional()
 
     @property
     def exit_code(self) -> int:

@@ -17,7 +17,7 @@ from syncline_design.verdict.measured import COMMONLY, coverage_of
 from syncline_design.verdict.named import NamedRole
 from syncline_design.verdict.pinned import as_measured
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import Verdict, Word
+from syncline_design.verdict.tree import Provenance, Verdict, Word
 from syncline_design.verdict.verify import check_loaded
 
 
@@ -61,6 +61,7 @@ class TimingMeaning(Record):
     requirement_changes: tuple[str, ...]
     sensors: tuple[SensorUnderTiming, ...]
     asked_coverage: float | None = optional()
+    provenance: Provenance | None = optional()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,6 +94,7 @@ def timing_meaning(
         before.name, before.file, before.verdict, None if after is None else after.verdict,
         _tau(before), _tau(after), _total(before), _total(after),
         _changes(before, after), _sensors(before, after, bound), _asked(case, study.timing),
+        before.provenance,
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final, cast
 
-from syncline_design.auditing.result import Audit, StreamAudit
+from syncline_design.auditing.result import Audit, AuditedFor, StreamAudit
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case
@@ -56,7 +56,8 @@ def held_against(audit: Audit, case: Case, seed: int) -> Audit:
     if not played and len(notes) == len(audit.notes):
         notes.append("no stream plays a role of the spec by its name or quantity: say which in "
                      "the spec, `log: {streams: {position: NAME, attitude: NAME}}`")  # fmt: skip
-    return replace(audit, streams=rows, notes=tuple(notes))
+    spec = AuditedFor(verdict.name, verdict.file, case.spec_sha256, case.catalogs_sha256, seed)
+    return replace(audit, streams=rows, notes=tuple(notes), spec=spec)
 
 
 def _roles(verdict: Verdict) -> Iterator[tuple[str, str, NamedRole]]:

@@ -17,6 +17,7 @@ _ESTIMATE_LADDERS: dict[str, tuple[tuple[str, float], ...]] = {
     "m/(m/s2)": (("m/(m/s2)", 1.0), ("mm/(m/s2)", 1e-3)),
     "": (("", 1.0), ("ppm", 1e-6)),
 }
+_LEAST_SHARE = 1e-6  # that is told as a figure
 
 
 def format_quantity(
@@ -49,7 +50,8 @@ def format_like(written: str, si_value: float, digits: int = 4) -> str:
 
     Text without a known unit gives the bare figure.
     """
-    unit = next((part for part in written.split() if part in UNITS and part != "%"), None)
+    parts = written.replace("\N{MICRO SIGN}", "u").split()
+    unit = next((part for part in parts if part in UNITS and part != "%"), None)
     if unit is None:
         return to_digits(si_value, digits)
     return f"{to_digits(si_value / float(UNITS[unit][1]), digits)} {unit}"
@@ -157,5 +159,8 @@ def format_nats(nats: float, digits: int | None = None) -> str:
 
 
 def percent(share: float, digits: int = 3) -> str:
-    """0.124 as `12.4 %`."""
+    """0.124 as `12.4 %`; what would need an exponent as `< 0.0001 %`."""
+    if 0.0 < abs(share) < _LEAST_SHARE:
+        least = to_digits(100.0 * _LEAST_SHARE)
+        return f"< {least} %" if share > 0.0 else f"> -{least} %"
     return f"{to_digits(100.0 * share, digits)} %"

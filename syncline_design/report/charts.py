@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
+from syncline_design.report.columns import alike, errors
 from syncline_design.report.palette import BAD, GOOD, INK, LINE, MUTED, SERIES, SHADE, SURFACE, WARN
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
@@ -67,7 +68,7 @@ def syncline(
             axes.plot(1 / tau, 1 / wider, color=LINE, linewidth=1, linestyle=(0, (1, 2)))
         axes.plot(1 / tau, 1 / error, color=LINE, linewidth=2.4, zorder=3)[0].set_gid("curve")
         _limit_and_design(axes, curve, low)
-        _syncline_labels(axes)
+        _syncline_labels(axes, curve.limit)
         return axes
 
     return draw(name, title, _describe(curve), (WIDTH, 318.0), build)
@@ -176,7 +177,7 @@ def _limit_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
           ("Error", numbers.error(curve.total_m, curve.limit))])  # fmt: skip
 
 
-def _syncline_labels(axes: Axes) -> None:
+def _syncline_labels(axes: Axes, limit: numbers.Limited | None) -> None:
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     scales.set_ticks(axes, "x", scales.decades(left, right), scales.power_of_ten)
     scales.set_ticks(axes, "y", scales.log_ticks(bottom, top), lambda v: numbers.number(v, 6))
@@ -184,7 +185,7 @@ def _syncline_labels(axes: Axes) -> None:
     axes.set_ylabel("accuracy 1/error [1/m]")
     scales.grid(axes)
     scales.inverse_axis(axes, "x", "timestamp error \u03c4", scales.short_time)
-    scales.inverse_axis(axes, "y", "Syncline error", scales.short_length)
+    scales.inverse_axis(axes, "y", "Syncline error", scales.error_label(limit))
 
 
 def _describe(curve: SynclineCurve) -> str:
@@ -307,7 +308,9 @@ def _waterfall(
     axes: Axes, terms: Sequence[LedgerBar], total: float, limit: numbers.Limited | None
 ) -> None:
     """Each term's bar starts where the one before ends; the last bar is the total."""
-    start, said = 0.0, numbers.error(total, limit)
+    sizes = [*(term.value_m for term in terms), total]
+    start, said, short = 0.0, errors(sizes, limit), errors(sizes, limit, 3)
+    shares = alike([(numbers.percent(v / total), v / total) for v in sizes]) if total else []
     for row, term in enumerate(terms):
         colour = {"sensor": SERIES[0], "sync": SERIES[1]}.get(term.kind, SERIES[3])
         axes.barh(
@@ -315,18 +318,18 @@ def _waterfall(
             linewidth=0.8, hatch=_HATCH.get(term.kind, ""), zorder=3,
         )  # fmt: skip
         start += term.value_m
-        beside(axes, row, numbers.error(term.value_m, limit, 3))
-        share = numbers.percent(term.value_m / total) if total else numbers.MISSING
+        beside(axes, row, short[row])
+        share = shares[row] if total else numbers.MISSING
         tell(
             axes,
             (start - term.value_m, start),
             (row - 0.31, row + 0.31),
-            [("Term", term.label), ("Error", numbers.error(term.value_m, limit)), ("Share", share)],
+            [("Term", term.label), ("Error", said[row]), ("Share", share)],
         )
     axes.barh(len(terms), total, height=0.62, color=INK, zorder=3)
-    beside(axes, len(terms), said)
+    beside(axes, len(terms), numbers.error(total, limit))
     tell(axes, (0.0, total), (len(terms) - 0.31, len(terms) + 0.31),
-         [("Term", "total"), ("Error", said)])  # fmt: skip
+         [("Term", "total"), ("Error", said[-1])])  # fmt: skip
 
 
 def beside(axes: Axes, row: float, text: str) -> None:

@@ -7,6 +7,7 @@ in: the vehicle's host clock, or UTC.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Final
 
 from syncline_design.machine.quick_dataclass import dataclass
@@ -14,16 +15,18 @@ from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, GRID, INK, LINE, MUTED, SERIES, SHADE
 from syncline_design.report.svg import InlineChart, draw, tell
-from syncline_design.report.text import shortened
+from syncline_design.report.text import shortened, visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ROW: Final = 44.0  # height of a sensor's row, and below
+ROW: Final = 44.0  # height of a sensor's row with one line of each, and below
+STEP: Final = 15.0  # from line to line
 HEAD: Final = 20.0  # of a vehicle's name [SVG units]
 BOX, HOST, UTC, BAR = 112.0, 268.0, 318.0, 18.0  # right end of the boxes; left ends; width
-LETTERS: Final = 18, 28  # of a name in a box, of a method above an arrow
+LETTERS: Final = 18, 28  # in a line of a box, in one above or below an arrow
+MOST_LINES: Final = 3  # of a name: a longer one is cut, its tooltip has it in full
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +58,8 @@ class ClockedVehicle:
 
 def clocks(vehicles: Sequence[ClockedVehicle], name: str = "fig-clocks") -> InlineChart:
     """Sensors to the left, clocks to the right, tau on every arrow between them."""
-    rows = sum(len(v.sensors) for v in vehicles)
-    height = HEAD + (HEAD + ROW) * len(vehicles) + ROW * rows
+    rows = sum(_high(one) for vehicle in vehicles for one in vehicle.sensors)
+    height = HEAD + (HEAD + ROW) * len(vehicles) + rows
 
     def build(figure: Figure) -> None:
         figure.set_layout_engine("none")
@@ -78,14 +81,35 @@ def clocks(vehicles: Sequence[ClockedVehicle], name: str = "fig-clocks") -> Inli
     return draw(name, "Who stamps whom", spoken, (WIDTH, height), build)
 
 
+def _lines(text: str, letters: int) -> list[str]:
+    """A name in lines, broken where its words are."""
+    found = wrap(visible(text), letters)
+    if len(found) <= MOST_LINES:
+        return found
+    return [*found[: MOST_LINES - 1], shortened(f"{found[MOST_LINES - 1]} ...", letters)]
+
+
+def _signal(one: Stamped) -> str:
+    return f"\u03c4 {numbers.time(one.tau_s, 3)}, {one.signal}"
+
+
+def _high(one: Stamped) -> float:
+    """Height of a sensor's row: what stands below one another in its box and at its arrow."""
+    in_box = len(_lines(one.sensor, LETTERS[0])) - 1
+    at_arrow = sum(len(_lines(text, LETTERS[1])) - 1 for text in (one.method, _signal(one)))
+    return ROW + STEP * max(in_box, at_arrow)
+
+
 def _vehicle(axes: Axes, vehicle: ClockedVehicle, top: float) -> float:
     """One vehicle from `top` downwards; where it ends."""
     axes.text(4.0, top + 0.5 * HEAD, shortened(vehicle.name, 40), va="center", color=MUTED)
     first = top + HEAD
-    end = first + ROW * len(vehicle.sensors)
+    end = first + sum(map(_high, vehicle.sensors))
     _bar(axes, HOST, first, end + ROW - 8.0, "host clock", SERIES[0])
-    for place, one in enumerate(vehicle.sensors):
-        _sensor(axes, one, first + (place + 0.5) * ROW)
+    above = first
+    for one in vehicle.sensors:
+        _sensor(axes, one, above + 0.5 * _high(one))
+        above += _high(one)
     _to_utc(axes, vehicle, end + 0.5 * ROW - 4.0)
     return end + ROW
 
@@ -102,17 +126,23 @@ def _bar(axes: Axes, left: float, top: float, bottom: float, words: str, colour:
 def _sensor(axes: Axes, one: Stamped, y: float) -> None:
     from matplotlib.patches import Rectangle
 
-    high = 32.0
+    high = _high(one) - 12.0
     axes.add_patch(Rectangle((2.0, y - 0.5 * high), BOX - 2.0, high, facecolor="none",
                              edgecolor=GRID, linewidth=1.2))  # fmt: skip
-    axes.text(8.0, y - 7.5, shortened(one.role, LETTERS[0]), va="center", color=MUTED)
-    axes.text(8.0, y + 7.5, shortened(one.sensor, LETTERS[0]), va="center", color=INK)
+    names = _lines(one.sensor, LETTERS[0])
+    head = y - 0.5 * STEP * len(names)
+    axes.text(8.0, head, shortened(one.role, LETTERS[0]), va="center", color=MUTED)
+    for k, name in enumerate(names, 1):
+        axes.text(8.0, head + k * STEP, name, va="center", color=INK)
     colour = LINE if one.within else BAD
     end = UTC if one.by_utc else HOST
-    _arrow(axes, BOX, end, y, colour)
-    axes.text(BOX + 5.0, y - 10.0, shortened(one.method, LETTERS[1]), va="center", color=INK)
-    words = f"\u03c4 {numbers.time(one.tau_s, 3)}, {one.signal}"
-    axes.text(BOX + 5.0, y + 10.0, shortened(words, LETTERS[1]), va="center", color=colour)
+    methods, signals = _lines(one.method, LETTERS[1]), _lines(_signal(one), LETTERS[1])
+    at = y + 0.5 * STEP * (len(methods) - len(signals))
+    _arrow(axes, BOX, end, at, colour)
+    for k, words in enumerate(reversed(methods)):
+        axes.text(BOX + 5.0, at - 10.0 - k * STEP, words, va="center", color=INK)
+    for k, words in enumerate(signals):
+        axes.text(BOX + 5.0, at + 10.0 + k * STEP, words, va="center", color=colour)
     tell(axes, (2.0, HOST), (y - 0.5 * high, y + 0.5 * high), [
         ("Sensor", f"{one.role}: {one.sensor}"), ("Signal", one.signal),
         ("Stamped by", one.method), ("In the time of", "UTC" if one.by_utc else "the host clock"),

@@ -27,9 +27,15 @@ class GridPoint:
 
 
 def simulated_against_syncline(
-    points: Sequence[GridPoint], name: str = "fig-grid", title: str | None = None
+    points: Sequence[GridPoint],
+    limit: numbers.Limited | None = None,
+    name: str = "fig-grid",
+    title: str | None = None,
 ) -> InlineChart:
-    """Worst case of the simulator over a grid of tau, beside the Syncline, and their ratio."""
+    """Worst case of the simulator over a grid of tau, beside the Syncline, and their ratio.
+
+    limit: of accuracy, in whose unit errors are told.
+    """
     shown = [p for p in points if p.tau_s > 0 and p.worst_m > 0 and p.syncline_m > 0]
     ratios = [p.worst_m / p.syncline_m for p in shown]
 
@@ -43,8 +49,8 @@ def simulated_against_syncline(
         lower.axhline(1.0, color=MUTED, linewidth=1)
         for point, ratio in zip(shown, ratios, strict=True):
             says = [("\u03c4", numbers.time(point.tau_s)),
-                    ("Simulated worst case", numbers.length(point.worst_m)),
-                    ("Syncline", numbers.length(point.syncline_m)),
+                    ("Simulated worst case", numbers.error(point.worst_m, limit)),
+                    ("Syncline", numbers.error(point.syncline_m, limit)),
                     ("Ratio", numbers.percent(ratio))]  # fmt: skip
             tell(upper, 1.0 / point.tau_s, 1.0 / point.worst_m, says)
         lower.plot(inverse, ratios, color=SERIES[1], marker="o", markersize=3.5, linewidth=1)

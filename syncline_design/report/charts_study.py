@@ -109,8 +109,16 @@ class NamedFront:
     points: tuple[CasePoint, ...]
 
 
-def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts") -> InlineChart:
-    """Exact fronts of cost against error as staircases, one colour and line style per case."""
+def fronts(
+    shown: Sequence[NamedFront],
+    currency: str,
+    limit: numbers.Limited | None = None,
+    name: str = "fig-fronts",
+) -> InlineChart:
+    """Exact fronts of cost against error as staircases, one colour and line style per case.
+
+    limit: of accuracy, in whose unit errors are told.
+    """
     styles = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)))
 
     def build(figure: Figure) -> None:
@@ -129,12 +137,12 @@ def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts")
             for point in front.points:
                 tell(axes, point.cost, point.error_m, [
                     ("Front", front.label), ("Price", numbers.money(point.cost, currency)),
-                    ("Error", numbers.length(point.error_m)),
+                    ("Error", numbers.error(point.error_m, limit)),
                 ])  # fmt: skip
         axes.set_xlim(max(0.0, min(costs) - 0.08 * span), right)
         axes.margins(y=0.12)
         low, high = axes.get_ylim()
-        scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.error_label(limit))
         scales.grid(axes)
         _count_axis(axes)
         axes.set_xlabel(f"cost [{currency}]")
@@ -143,8 +151,8 @@ def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts")
 
     errors = [point.error_m for front in shown for point in front.points]
     spoken = (
-        f"{len(shown)} exact fronts; errors from {numbers.length(min(errors))} to "
-        f"{numbers.length(max(errors))}. The table holds their ends."
+        f"{len(shown)} exact fronts; errors from {numbers.error(min(errors), limit)} to "
+        f"{numbers.error(max(errors), limit)}. The table holds their ends."
     )
     size = (WIDTH, 300.0 + 17.0 * len(shown))
     return draw(name, "Cost against error, front by case", spoken, size, build)

@@ -48,7 +48,7 @@ def fitted(table: Table, room: int, paint: Paint | None = None) -> Iterator[str]
 def _widths(heads: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[int] | None:
     """The columns' widths: as wide as they like, else those give way that cost the fewest lines.
 
-    None where no words leave room for all of them.
+    None where no words leave room for all of them, and where records take fewer lines.
     """
     columns = [[row[k] for row in rows] for k in range(len(heads))]
     full = [max(map(len, (head, *cells))) for head, cells in zip(heads, columns, strict=True)]
@@ -60,14 +60,25 @@ def _widths(heads: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> l
     while sum(full) > spare:
         open_ones = [k for k in range(len(full)) if full[k] > least[k]]
         full[min(open_ones, key=lambda k: (_height(sizes, full, k), -full[k]))] -= 1
-    return full
+    return None if _height(sizes, full) > _height_of_records(sizes, room) else full
 
 
-def _height(sizes: Sequence[Sequence[int]], widths: Sequence[int], narrower: int) -> int:
-    """About how many lines a table takes with one column narrower by one."""
+def _height(sizes: Sequence[Sequence[int]], widths: Sequence[int], narrower: int = -1) -> int:
+    """About how many lines a table takes, with one column narrower by one."""
     tried = [width - (k == narrower) for k, width in enumerate(widths)]
     return sum(
         max(-(-size // width) for size, width in zip(row, tried, strict=True)) for row in sizes
+    )
+
+
+def _height_of_records(sizes: Sequence[Sequence[int]], room: int) -> int:
+    """About how many lines the same takes with a line for each cell."""
+    heads, *rows = sizes
+    return sum(
+        -(-(size + (2 + head if k else 0)) // room)
+        for row in rows
+        for k, (head, size) in enumerate(zip(heads, row, strict=True))
+        if size
     )
 
 

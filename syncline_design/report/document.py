@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report.table import Table, Tone
+from syncline_design.report.text import ticked, unticked
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
@@ -211,21 +212,24 @@ def given(text: object) -> Span:
 
 
 def spans(words: Inline) -> tuple[Span, ...]:
-    """Inline text as spans, empty ones left out."""
+    """Inline text as spans, empty ones left out; what stands in backticks as code."""
     parts = words if isinstance(words, tuple) else (words,)
     found = (part if isinstance(part, Span) else Span(part) for part in parts)
-    return tuple(span for span in found if span.text)
+    return tuple(one for span in found for one in _coded(span) if one.text)
 
 
-def coded(text: str, style: Style = "") -> tuple[Span, ...]:
-    """Words of ours as they stand in a terminal or in JSON, what they have in backticks as code.
+def _coded(span: Span) -> Iterator[Span]:
+    """Code as it is; in what is told, names and commands apart from the words around them.
 
-    An odd backtick stays as it is, with all others.
+    What stands out or back as a whole does so with them.
     """
-    parts = text.split("`")
-    if len(parts) % 2 == 0:
-        return (Span(text, style),)
-    return tuple(Span(part, "code" if k % 2 else style) for k, part in enumerate(parts) if part)
+    if span.style == "code":
+        yield span
+    elif span.style in ("strong", "muted"):
+        yield Span(unticked(span.text), span.style)
+    else:
+        for k, part in enumerate(ticked(span.text)):
+            yield Span(part, "code" if k % 2 else span.style)
 
 
 def plain(words: Inline) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from syncline_design.report.ci import SILENT, Notice, all_notices
-from syncline_design.report.text import visible
+from syncline_design.report.text import unticked, visible
 from syncline_design.report.verdict_words import design_sentence, outcome
 from syncline_design.verdict.tree import Checked
 
@@ -39,14 +39,14 @@ def github_command(notice: Notice) -> str:
     file = PurePath(notice.file).as_posix()
     return (
         f"::{_COMMANDS[notice.level]} file={_property(file)},line={notice.line},"
-        f"col={notice.column},title={_property(title)}::{_data(message)}"
+        f"col={notice.column},title={_property(title)}::{_data(unticked(message))}"
     )
 
 
 def github_notice(name: str, file: str, text: str) -> str:
     """The outcome, at the top of the spec."""
     place = f"file={_property(PurePath(file).as_posix())},line=1"
-    return f"::notice {place},title={_property(name)}::{_data(text)}"
+    return f"::notice {place},title={_property(name)}::{_data(unticked(text))}"
 
 
 def _data(text: str) -> str:

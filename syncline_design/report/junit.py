@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
 
 from syncline_design.report.ci import Notice, notices
-from syncline_design.report.text import visible
+from syncline_design.report.text import unticked, visible
 from syncline_design.report.verdict_words import outcome
 from syncline_design.verdict.tree import Checked
 
@@ -52,7 +52,9 @@ def suite_of(name: str, file: str, found: Sequence[Notice], word: str) -> Elemen
     for notice in cases:
         suite.append(_case(notice, file))
     lines = [word]
-    lines += [f"warning [{f.rule}]: {visible(f.message)}" for f in found if f.level == "warning"]
+    lines += [
+        f"warning [{f.rule}]: {visible(unticked(f.message))}" for f in found if f.level == "warning"
+    ]
     ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)
     return suite
 
@@ -69,7 +71,7 @@ def _case(notice: Notice, file: str) -> ElementTree.Element:
             "time": "0",
         },
     )
-    message = visible(notice.message)
+    message = visible(unticked(notice.message))
     place = f"{visible(notice.file)}:{notice.line}:{notice.column}"
     if notice.id:
         listed = ElementTree.SubElement(case, "properties")
@@ -84,7 +86,7 @@ def _case(notice: Notice, file: str) -> ElementTree.Element:
         error = ElementTree.SubElement(case, "error", {"type": notice.rule, "message": message})
         error.text = f"{place}: {message}"
     elif notice.level in ("waived", "known"):
-        reason = f"{visible(notice.justification)}; {message}"
+        reason = f"{visible(unticked(notice.justification))}; {message}"
         ElementTree.SubElement(case, "skipped", {"message": reason})
     elif notice.level == "not_reached":
         ElementTree.SubElement(case, "skipped", {"message": message})

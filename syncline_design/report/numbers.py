@@ -232,14 +232,6 @@ def with_uncertainty(value: float, uncertainty: float | None, unit: str) -> str:
     return typeset(format_estimate(value, uncertainty, unit))
 
 
-_MICRO: Final = re.compile(r"(?<=\d) u(?=[smW]\b)")
-
-
-def micro(text: str) -> str:
-    """A sentence with its micro signs, `up to 24.16 \N{MICRO SIGN}s`, as beside it in tables."""
-    return _MICRO.sub("\N{NO-BREAK SPACE}\N{MICRO SIGN}", text)
-
-
 def typeset(text: str) -> str:
     """A figure and its unit as pages print them: micro sign, minus, no break before the unit."""
     for plain, printed in _TYPOGRAPHIC:

@@ -95,10 +95,21 @@ def on_audit(result: Audit) -> Document:
             *section("notes", "Notes", [Items(tuple(given(n) for n in result.notes))]
                      if result.notes else []),
             *section("evidence", "Evidence", show(_evidence(result), silent=True)),
-            *provenance([("syncline-design", result.version)]),
+            *provenance(_provenance(result)),
         ),
         title=f"Audit: {_name(result)}",
     )  # fmt: skip
+
+
+def _provenance(result: Audit) -> list[tuple[str, str]]:
+    """What the figures are pinned by; those in metres by a spec besides."""
+    version, spec = ("syncline-design", result.version), result.spec
+    if spec is None:
+        return [version]
+    return [
+        ("Spec file", spec.file), version, ("Spec, SHA-256", spec.spec_sha256),
+        ("Catalogs, SHA-256", spec.catalogs_sha256), ("Seed", str(spec.seed)),
+    ]  # fmt: skip
 
 
 def _name(result: Audit) -> str:

@@ -65,21 +65,23 @@ def on_choice(found: Optimized) -> Document:
         sections=(
             *_why_not(found, currency),
             *section("designs", "Best designs", show(designs, silent=True)),
-            *why_not_section(result, currency),
+            *why_not_section(result, currency, limit),
             *section("alternatives", "If a sensor cannot be had", show(without, silent=True)),
             *section("bargains", "Worth a thought", bargains),
             *section("warnings", "Warnings", warning_nodes(found.result.warnings)),
             *_front(found),
-            *section("hinges", "What it hinges on", hinges_nodes(found.result)),
+            *section("hinges", "What it hinges on", hinges_nodes(found.result, limit)),
             *section("incomplete", "Not complete", _items(incomplete_lines(found.result))),
         ),
         source=str(found.case.path),
     )
 
 
-def why_not_section(result: Optimization, currency: str) -> list[Section]:
+def why_not_section(
+    result: Optimization, currency: str, limit: numbers.Limited | None
+) -> list[Section]:
     """What `--why-not` asked about."""
-    return section("why-not", "Why not", why_not_nodes(result.why_not, currency))
+    return section("why-not", "Why not", why_not_nodes(result.why_not, currency, limit))
 
 
 def _items(lines: Sequence[str]) -> list[Node]:

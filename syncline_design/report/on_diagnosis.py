@@ -69,6 +69,10 @@ _UNSOUND: Final = Outcome(
 LARGE: Final = 1.25  # times the RMS that the spec's noise expects: said in the outcome
 NOWHERE: Final = "in no regime on average: it shows in how the errors vary, not in their mean"
 MOST_REGIMES: Final = 4  # told outside the page
+NAT: Final = (
+    "1 nat, the unit of evidence: the log is 2.7 times as likely with it as without; 5 nat: 148 "
+    "times."
+)
 
 
 def on_diagnosis(found: DiagnosisAndDesign) -> Document:
@@ -167,7 +171,7 @@ def _found_text(found: Diagnosis) -> str:
 
 def _called(one: Finding) -> str:
     """The sentence of a cause; of a stand-in, that it is none."""
-    text = numbers.micro(one.sentence)
+    text = one.sentence
     return text if one.kind == "cause" else f"Not as a cause, as the nearest word for it: {text}"
 
 
@@ -231,17 +235,14 @@ def _facts(found: Diagnosis) -> list[tuple[str, str]]:
 
 def _findings(found: Diagnosis) -> list[Node]:
     """Material causes each at length, then the noise, what is immaterial, and what is left."""
+    causes = [one for one in found.findings if one.material and one.kind != "noise"]
     nodes: list[Node] = [
-        finding_node(one, found.plan)
-        for one in found.findings
-        if one.material and one.kind != "noise"
+        finding_node(one, found.plan, first=k == 0) for k, one in enumerate(causes)
     ]
     if lines := noise_lines(found.findings):
         nodes.append(Items(tuple(lines)))
     slight = [
-        f"{_effect_of(one)}: {numbers.micro(_figures_of(one))}"
-        for one in found.findings
-        if not one.material
+        f"{_effect_of(one)}: {_figures_of(one)}" for one in found.findings if not one.material
     ]
     if slight:
         nodes.append(Text(f"Seen, immaterial: {'; '.join(slight)}.", quiet=True))
@@ -307,14 +308,18 @@ def _spelt(one: Finding | Rival) -> tuple[str, str]:
     return f"{one.effect}({one.sensor})", f"{one.effect}({one.stage}.{one.sensor})"
 
 
-def finding_node(found: Finding, drive: NextDrive | None = None) -> Node:
-    """One finding: its figures, how sure it is, what else it could be."""
+def finding_node(found: Finding, drive: NextDrive | None = None, *, first: bool = True) -> Node:
+    """One finding: its figures, how sure it is, what else it could be.
+
+    first: of a document, which says what its evidence is counted in.
+    """
     facts = [(_spaced(split_suffix(n)[0]), _parameter_text(p)) for n, p in found.parameters.items()]
     nodes: list[Node] = [
         Heading(given(_spaced(found.effect)), given(f"{found.sensor}, {found.stage}")),
         Text(_full_stop(_called(found)), reach="page"),
         Facts(tuple(facts)),
         Text(numbers.unbroken(f"Evidence: {_full_stop(found.evidence)}")),
+        *([Text(numbers.unbroken(NAT), quiet=True)] if first and " nat" in found.evidence else []),
         *scope_nodes(found),
     ]
     if found.varying:

@@ -29,7 +29,7 @@ from syncline_design.report.document import (
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.text import visible
+from syncline_design.report.text import unticked, visible
 from syncline_design.report.verdict_words import kind_words, pinned_by, status_word, with_waived
 from syncline_design.report.words import KINDS, OUTCOMES
 from syncline_design.verdict.tree import PREDICATES
@@ -40,7 +40,7 @@ def render_diff(name: str, data: Diff) -> str:
     if name != "github":
         return rendered(name, data, lambda: on_diff(data))
     level = "notice" if data.exit_code == 0 else "error"
-    text = visible(" ".join((headline(data), *reasons(data)))).replace("%", "%25")
+    text = visible(unticked(" ".join((headline(data), *reasons(data))))).replace("%", "%25")
     file = visible(data.new.file)
     place = file.replace("%", "%25").replace(":", "%3A").replace(",", "%2C")
     return f"::{level} file={place},line=1::{text}\n"
@@ -125,7 +125,7 @@ def effect_words(data: Diff | VerdictChanges) -> str:
         parts.append(f"price in {cost.unit} (before: {cost.old_unit})")
     if error and abs(error) > 1e-12:
         word = "larger" if error > 0 else "smaller"
-        parts.append(f"Syncline error {numbers.length(abs(error))} {word}")
+        parts.append(f"Syncline error {numbers.error(abs(error), _limits(data)[1])} {word}")
     if None in (data.error.old, data.error.new):  # a side has no design
         parts = []
     return ", ".join([*parts, _verdict_words(data.verdict)])
@@ -219,13 +219,19 @@ def _sums(data: Diff) -> Table:
     return table("Sums, before and now", heads, [*rows, _error_row(data)])
 
 
-def _error_row(data: Diff) -> tuple[Cell | str, ...]:
-    """The Syncline error on either side, in the unit of the tightest limit that it has there."""
+def _limits(data: Diff | VerdictChanges) -> tuple[Standing | None, Standing | None]:
+    """The tightest limit of accuracy on either side."""
     asked = [entry for entry in data.requirements if entry.kind == "accuracy"]
     old, new = (
         min((row for row in rows if row is not None), key=lambda row: row.limit, default=None)
         for rows in ([entry.old for entry in asked], [entry.new for entry in asked])
     )
+    return old, new
+
+
+def _error_row(data: Diff) -> tuple[Cell | str, ...]:
+    """The Syncline error on either side, in the unit of the tightest limit that it has there."""
+    old, new = _limits(data)
     before, now = numbers.error(data.error.old, old), numbers.error(data.error.new, new)
     change = _change(data.error, now)
     return "Syncline error", Cell(before, data.error.old), Cell(now, data.error.new), change

@@ -23,6 +23,14 @@ from syncline_design.report.document import (
 from syncline_design.report.table import Cell, Table, table
 
 NOTHING: Final = 1e-4  # nat a sample that are shown as none
+PLACEBO: Final = (
+    "A placebo is an effect that was not chosen, added to see that more parameters alone do not "
+    "shrink the gap."
+)
+GAP_CAPTION: Final = (
+    "RMS of the residual on held-out data as effects are added. Floor (dashed): the better of what "
+    "the spec's noise expects and of what these effects reach when all rows are fitted."
+)
 _SCORES: Final = ("RMS #", "Reduced \u03c7\u00b2 #", "NLL per sample #", "95 % coverage #")
 
 
@@ -42,8 +50,11 @@ def gap_nodes(found: Diagnosis) -> list[Node]:
     lead = (
         "Judged on data that the fit did not see. At best is what the same effects reach when all "
         "rows are fitted; RMS alone cannot show an effect on the noise itself, the likelihood "
-        "(NLL) and the coverage do."
+        "(NLL, its negative logarithm, in nat a sample: 0.1 nat lower is 1.1 times as likely) and "
+        "the coverage do."
     )
+    if found.gap.placebo.held_out is not None:
+        lead += f" {PLACEBO}"
     tables = [*show(gap_table(found.gap)), *show(_steps(found.steps), reach="page")]
     placebo = _placebo_text(found.gap)
     unseen = _unseen_text(found.gap.unseen)
@@ -99,7 +110,7 @@ def _gap_chart(found: Diagnosis) -> list[Node]:
     if not steps or held_out is None:
         return []
     draw = partial(drawings.gap_staircase, steps, held_out.floor.rms_m)
-    return [Chart("gap", draw, "RMS of the residual on held-out data as effects are added.")]
+    return [Chart("gap", draw, GAP_CAPTION)]
 
 
 def _coverage_chart(plots: Plots) -> list[Node]:

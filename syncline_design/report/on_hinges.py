@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from syncline_design.choice.slack import Slack
 from syncline_design.report import numbers
@@ -16,13 +15,10 @@ from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.words import KINDS
 from syncline_design.verdict.optimization import Optimization
 
-if TYPE_CHECKING:
-    pass
 
-
-def hinges_nodes(hinges: Optimization) -> list[Node]:
-    """Slack of every figure, tolerances, what to measure next."""
-    nodes = [] if hinges.slack is None else show(slack_table(hinges.slack))
+def hinges_nodes(hinges: Optimization, limit: numbers.Limited | None) -> list[Node]:
+    """Slack of every figure, tolerances, what to measure next; limit: of accuracy."""
+    nodes = [] if hinges.slack is None else show(slack_table(hinges.slack, limit))
     if hinges.tolerances is not None:
         nodes.append(Text(hinges.tolerances.text))
     if hinges.measure_next is None:
@@ -40,30 +36,37 @@ def hinges_nodes(hinges: Optimization) -> list[Node]:
     return [*nodes, *show(table(caption, heads, rows))]
 
 
-def slack_table(rows: Sequence[Slack]) -> Table:
-    """The slack ledger, a row per term."""
+def slack_table(rows: Sequence[Slack], limit: numbers.Limited | None = None) -> Table:
+    """The slack ledger, a row per term; errors in the unit of the limit of accuracy."""
     return table(
         "How far each term may grow",
         ("Term", "Now #", "Verdict fails at #", "What then breaks", "Payload changes at #"),
         [
             (
                 f"{row.stage} {row.term}" + (f", {row.mission}" if row.mission else ""),
-                Cell(numbers.si_quantity(row.value, row.unit), row.value),
-                _threshold(row, row.fails_at, "verdict"),
+                Cell(_figure(row.value, row, limit), row.value),
+                _threshold(row, row.fails_at, "verdict", limit),
                 KINDS.get(row.limited_by or "", row.limited_by or ""),
-                _threshold(row, row.payload_changes_at, "payload"),
+                _threshold(row, row.payload_changes_at, "payload", limit),
             )
             for row in rows
         ],
     )
 
 
-def _threshold(row: Slack, value: float | None, what: str) -> Cell:
+def _figure(value: float, row: Slack, limit: numbers.Limited | None) -> str:
+    """Errors in the unit of the limit; a distance, which is a length too, by its own."""
+    if row.unit == "m" and row.term.endswith("error"):
+        return numbers.error(value, limit)
+    return numbers.si_quantity(value, row.unit)
+
+
+def _threshold(row: Slack, value: float | None, what: str, limit: numbers.Limited | None) -> Cell:
     """A threshold; without one `never` where that is proven, else how far was looked."""
     if value is not None:
-        return Cell(numbers.si_quantity(value, row.unit), value)
+        return Cell(_figure(value, row, limit), value)
     if what in row.never:
         return Cell("never")
     if row.searched_to is None:
         return Cell("not known")
-    return Cell(f"not up to {numbers.si_quantity(row.searched_to, row.unit)}")
+    return Cell(f"not up to {_figure(row.searched_to, row, limit)}")

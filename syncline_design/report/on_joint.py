@@ -54,7 +54,7 @@ def _column(estimates: Sequence[Estimate]) -> list[Cell]:
     }
     texts = format_estimates(list(pairs.values()), estimates[0].unit)
     shown = dict(zip(pairs, texts, strict=True))
-    return [Cell(numbers.micro(shown.get(k, one.text))) for k, one in enumerate(estimates)]
+    return [Cell(shown.get(k, one.text)) for k, one in enumerate(estimates)]
 
 
 def _by_log(found: Finding) -> list[Node]:

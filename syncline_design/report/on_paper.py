@@ -143,7 +143,7 @@ def _list(caption: str, cells: list[Printed]) -> Table:
         mark, tone = _MARKS[cell.status]
         told = cell.note.partition(":")[0] if cell.status == "erratum" else cell.note
         said = f"{cell.status}, {told}" if told else cell.status
-        printed = Cell(numbers.typeset(cell.printed_text), cell.printed)
+        printed = Cell(numbers.typeset(cell.printed_text), cell.printed, written=True)
         computed = Cell(_computed(cell), cell.computed)
         rows.append([cell.row, cell.column, printed, computed, Cell(said, tone=tone, mark=mark)])
     return table(caption, ("Row", "Column", "Printed #", "Computed #", "Status"), rows)
@@ -163,7 +163,7 @@ def _figures(result: Reproduction) -> list[Node]:
     )
     return [
         Text(words, reach="page"),
-        *articles,
+        Group(tuple(articles), "flow", reach="page"),
         *([Items(beside, reach="text")] if beside else []),
     ]
 
@@ -178,9 +178,8 @@ def _article(figure: PlottedFigure) -> Node:
         said.append(Text(figure.note, quiet=True))
     title = f"Figure {figure.number}: {figure.title}"
     chart = Chart(f"paper-{figure.number}", lambda: _drawn(figure, title), "")
-    column = Group((*said, *show(_curves(figure))))
-    return Group((Heading(title), Group((chart, column), "split")), "article",
-                 f"figure-{figure.number}", reach="page")  # fmt: skip
+    nodes = (Heading(title), chart, *said, *show(_curves(figure)))
+    return Group(nodes, "article", f"figure-{figure.number}", reach="page")
 
 
 def _simulated(points: tuple[SimulatedPoint, ...]) -> str:

@@ -24,7 +24,6 @@ from syncline_design.report.document import (
     Outcome,
     Text,
     code,
-    coded,
     provenance,
     section,
     show,
@@ -99,7 +98,7 @@ def _sentences(found: Plan) -> Iterator[Inline]:
     if found.confused:
         names = ", ".join(map(effect_words, found.confused))
         yield f"Left free one at a time, these would take it: {names}."
-    yield from map(coded, found.cautions or ())
+    yield from found.cautions or ()
 
 
 def _how_far(found: Plan) -> str:
@@ -337,7 +336,7 @@ def _rests(found: Plan) -> list[Node]:
     lines = [f"Noise {found.noise}."]
     if found.assumed:
         lines.append("Not stated by the spec, so taken as usual: " + "; ".join(found.assumed) + ".")
-    return [Items(tuple(map(coded, lines)))]
+    return [Items(tuple(lines))]
 
 
 def _provenance(found: Plan) -> list[tuple[str, str]]:

@@ -115,34 +115,37 @@ def _grid(result: Simulation, system: System | None) -> list[Node]:
         Text("Every magnitude is held to its Syncline term and the directions are free: the "
              "largest error is found by optimization, not by luck of sampling."),
         Text(said),
-        *_grid_chart(result.grid),
-        *show(_grid_table(result.grid, reasons=False), silent=True, reach="text"),
+        *_grid_chart(result.grid, within),
+        *show(_grid_table(result.grid, within, reasons=False), silent=True, reach="text"),
         *_causes(result.grid),
-        Group(tuple(show(_grid_table(result.grid, reasons=True), silent=True)), "fold",
+        Group(tuple(show(_grid_table(result.grid, within, reasons=True), silent=True)), "fold",
               summary="Worst case and Syncline at every \u03c4, and why they differ", reach="page"),
     ]  # fmt: skip
 
 
-def _grid_chart(grid: tuple[ComparisonRow, ...]) -> list[Node]:
+def _grid_chart(grid: tuple[ComparisonRow, ...], limit: numbers.Limited | None) -> list[Node]:
     def draw() -> InlineChart:
         from syncline_design.report.charts_grid import GridPoint, simulated_against_syncline
 
         return simulated_against_syncline(
-            [GridPoint(r.tau_s, r.worst_case_m, r.syncline_m) for r in grid if r.tau_s > 0.0]
+            [GridPoint(r.tau_s, r.worst_case_m, r.syncline_m) for r in grid if r.tau_s > 0.0],
+            limit,
         )
 
     caption = "Line: Syncline. Dots: worst case of the simulator. Below: their ratio."
     return [Chart("grid", draw, caption)] if len(grid) > 1 else []
 
 
-def _grid_table(grid: tuple[ComparisonRow, ...], *, reasons: bool) -> Table:
+def _grid_table(
+    grid: tuple[ComparisonRow, ...], limit: numbers.Limited | None, *, reasons: bool
+) -> Table:
     """Worst case and Syncline at every tau; with the reason of the difference where asked for."""
     rows = []
     for row in grid:
         cells = [
             Cell(numbers.time(row.tau_s), row.tau_s),
-            Cell(numbers.length(row.worst_case_m), row.worst_case_m),
-            Cell(numbers.length(row.syncline_m), row.syncline_m),
+            Cell(numbers.error(row.worst_case_m, limit), row.worst_case_m),
+            Cell(numbers.error(row.syncline_m, limit), row.syncline_m),
             Cell(numbers.percent(row.ratio, 4), numbers.finite(row.ratio)),
         ]
         rows.append([*cells, *([Cell(row.reason)] if reasons else [])])

@@ -115,20 +115,23 @@ def _sampled(summary: StudySummary) -> list[Node]:
 
     def draw() -> InlineChart:
         several = varied(summary)
-        says = [_says(summary.briefs[point.number - 1], several) for point in found.points]
+        briefs = [summary.briefs[point.number - 1] for point in found.points]
+        says = [_says(one, several, summary.accuracy) for one in briefs]
         return charts_study.sampled_cases(found, currency, says)
 
     return [Chart("sampled", draw, _sampled_caption(found))]
 
 
-def _says(brief: Brief, several: list[tuple[int, Factor]]) -> list[tuple[str, str]]:
+def _says(
+    brief: Brief, several: list[tuple[int, Factor]], limit: numbers.Limited | None
+) -> list[tuple[str, str]]:
     """A case in words: number, setting, answer, price, error, payload."""
     setting = [(factor.key, brief.labels[i]) for i, factor in several]
     found = [("Case", str(brief.number)), *setting, ("Verdict", brief.verdict)]
     if brief.cost is not None:
         found.append(("Price", numbers.money(brief.cost, brief.currency)))
     if brief.error_m is not None:
-        found.append(("Error", numbers.length(brief.error_m)))
+        found.append(("Error", numbers.error(brief.error_m, limit)))
     return [*found, ("Payload", ", ".join(pick.name for pick in brief.picks))]
 
 
@@ -144,7 +147,7 @@ def _fronts(summary: StudySummary) -> list[Node]:
     nodes: list[Node] = []
     if len({front.currency for front in chosen}) == 1:
         named = [charts_study.NamedFront(_common(summary, f), f.points) for f in chosen]
-        draw = partial(charts_study.fronts, named, chosen[0].currency)
+        draw = partial(charts_study.fronts, named, chosen[0].currency, summary.accuracy)
         caption = "At most eight fronts are drawn; the table has all that differ."
         nodes.append(Chart("fronts", draw, caption))
     return [*nodes, *show(_fronts_table(summary), silent=True, reach="page")]
@@ -181,7 +184,7 @@ def _common(summary: StudySummary, front: StudyFront) -> str:
 
 
 def _fronts_table(summary: StudySummary) -> Table:
-    rows = []
+    rows, limit = [], summary.accuracy
     for front in summary.fronts:
         cheapest, finest = front.points[0], front.points[-1]
         currency = front.currency
@@ -190,9 +193,9 @@ def _fronts_table(summary: StudySummary) -> Table:
             Cell(numbers.count(len(front.cases)), float(len(front.cases))),
             Cell(numbers.count(len(front.points)), float(len(front.points))),
             Cell(numbers.money(cheapest.cost, currency), cheapest.cost),
-            Cell(numbers.length(cheapest.error_m), cheapest.error_m),
+            Cell(numbers.error(cheapest.error_m, limit), cheapest.error_m),
             Cell(numbers.money(finest.cost, currency), finest.cost),
-            Cell(numbers.length(finest.error_m), finest.error_m),
+            Cell(numbers.error(finest.error_m, limit), finest.error_m),
         ))  # fmt: skip
     heads = ("With", "Cases #", "Points #", "Cheapest #", "its error #", "Most accurate: cost #",
              "its error #")  # fmt: skip
@@ -217,7 +220,7 @@ def _sampled_caption(data: Scatter) -> str:
 
 
 def _case_table(summary: StudySummary) -> Table:
-    result = summary.result
+    result, limit = summary.result, summary.accuracy
     several = varied(summary)
     many = len(result.study.bases) > 1
     rows = []
@@ -231,7 +234,7 @@ def _case_table(summary: StudySummary) -> Table:
             *_setting_cells(brief, several),
             Cell(shown.word, tone=shown.tone, mark=shown.mark),
             Cell(numbers.money(brief.cost, brief.currency), brief.cost),
-            Cell(numbers.length(brief.error_m), brief.error_m),
+            Cell(numbers.error(brief.error_m, limit), brief.error_m),
             Cell(why),
         ])  # fmt: skip
     keys = [factor.key for _, factor in several] if len(several) <= MOST_KEYS else ["Setting"]

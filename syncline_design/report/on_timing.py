@@ -27,6 +27,7 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.verdict_words import pinned_by
 from syncline_design.verdict.measured import coverage_words
 from syncline_design.verdict.tree import PREDICATES
 
@@ -37,7 +38,7 @@ _MOST_ROWS: Final = 40
 _RESTS: Final = {
     "independent": "a measurement that does not steer the clock",
     "servo": "the offsets of the servo itself: it nulls what it measures, so a constant asymmetry "
-    "of the path does not show (declare it: --declare path_asymmetry=5us)",
+    "of the path does not show (declare it: `--declare path_asymmetry=5us`)",
     "servo_and_declared": "the offsets of the servo itself, and what was declared beside",
     "unknown": "offsets as given; whether they steer the clock the logs do not say (--independent "
     "says that they do not)",
@@ -71,10 +72,18 @@ def on_timing(result: TimingAndSpec) -> Document:
             *section("notes", "Notes", [Items(tuple(given(n) for n in result.notes))]
                      if result.notes else []),
             *section("evidence", "Evidence", show(_evidence(result), silent=True)),
-            *provenance([("syncline-design", result.version)]),
+            *provenance(_provenance(result)),
         ),
         title=f"Timing: {result.source.name}",
     )  # fmt: skip
+
+
+def _provenance(result: TimingAndSpec) -> list[tuple[str, str]]:
+    """What the figures are pinned by; what they mean for a spec by that one besides."""
+    spec = result.spec
+    if spec is None or spec.provenance is None:
+        return [("syncline-design", result.version)]
+    return [("Spec file", spec.file), *pinned_by(spec.provenance)]
 
 
 def _outcome(result: Timing) -> Outcome:

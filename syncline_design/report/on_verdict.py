@@ -16,6 +16,7 @@ from syncline_design.report import (
     verdict_tables,
     verdict_words,
 )
+from syncline_design.report.columns import errors
 from syncline_design.report.document import (
     Document,
     Facts,
@@ -225,20 +226,26 @@ def _syncline(verdict: Verdict) -> list[Node]:
     limit = verdict_charts.tightest_limit(verdict, "accuracy")
     tau, crit = syncline.tau_s, syncline.tau_crit_s
     bound = "synchronisation" if crit is not None and tau >= crit else "sensor noise"
+    more = [
+        (label, math.fsum(beside))
+        for kind, label in (("systematic", "Known effects"), ("underway", "Between samples"))
+        if (beside := [term.value_m for term in syncline.ledger if term.kind == kind])
+    ]
+    sensor, sync, *beside_m, total = errors(
+        [syncline.sensor_error_m, syncline.sync_error_m, *(size for _, size in more),
+         syncline.total_m], limit,
+    )  # fmt: skip
     facts = [
-        ("Sensor error (roof)", numbers.error(syncline.sensor_error_m, limit)),
+        ("Sensor error (roof)", sensor),
         ("Synchronisation rate (slope)", numbers.speed(syncline.sync_rate_mps)),
         ("\u03c4 of the system", numbers.time(tau)),
         ("\u03c4_crit of the system", numbers.time_limit(crit)),
         ("Bound by", bound),
-        ("Synchronisation error", numbers.error(syncline.sync_error_m, limit)),
-        ("Total error", numbers.error(syncline.total_m, limit)),
+        ("Synchronisation error", sync),
+        *zip((label for label, _ in more), beside_m, strict=True),
+        ("Total error", total),
         ("Drifts, grids, heave charged for", numbers.horizon(verdict.horizon)),
     ]
-    for kind, label in (("systematic", "Known effects"), ("underway", "Between samples")):
-        beside = [term.value_m for term in syncline.ledger if term.kind == kind]
-        if beside:
-            facts.insert(-2, (label, numbers.error(math.fsum(beside), limit)))
     column = Group((Facts(tuple(facts)), *verdict_charts.explorer(verdict)))
     return [Group((*chart, column), "split"), *show(verdict_tables.models(syncline, limit))]
 

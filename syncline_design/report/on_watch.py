@@ -25,7 +25,6 @@ from syncline_design.report.document import (
     Outcome,
     Text,
     code,
-    coded,
     given,
     provenance,
     section,
@@ -153,7 +152,7 @@ def _alarm(one: Alarm) -> Node:
 
 def _odd(found: Watch) -> list[Node]:
     nodes: list[Node] = (
-        [Items(tuple(map(coded, found.cautions)), mark="!", tone="warn")] if found.cautions else []
+        [Items(tuple(found.cautions), mark="!", tone="warn")] if found.cautions else []
     )
     return [*nodes, *torn_nodes(found.torn)]
 

@@ -16,14 +16,16 @@ KINDS = {
 }
 
 
-def why_not_nodes(answers: Sequence[Answer] | None, currency: str) -> list[Node]:
-    """One entry a line; one that the spec does not list has two."""
+def why_not_nodes(
+    answers: Sequence[Answer] | None, currency: str, limit: numbers.Limited | None
+) -> list[Node]:
+    """One entry a line; one that the spec does not list has two; limit: of accuracy."""
     if not answers:
         return []
-    return [Items(tuple(_line(one, currency) for one in answers))]
+    return [Items(tuple(_line(one, currency, limit) for one in answers))]
 
 
-def _line(one: Answer, currency: str) -> str:
+def _line(one: Answer, currency: str, limit: numbers.Limited | None) -> str:
     head = f"{one.entry} ({KINDS[one.kind]})"
     if isinstance(one, NotTaken):
         place = "" if one.place is None else f", {one.place}"
@@ -32,17 +34,19 @@ def _line(one: Answer, currency: str) -> str:
     if one.in_design:
         return f"{head}: in the best design, for {where}"
     unlisted = "" if one.candidate else "were it a candidate, "
-    return f"{head}: {unlisted}the best design with it, for {where}, {_compared(one, currency)}"
+    return (
+        f"{head}: {unlisted}the best design with it, for {where}, {_compared(one, currency, limit)}"
+    )
 
 
-def _compared(one: HeldBack, currency: str) -> str:
+def _compared(one: HeldBack, currency: str, limit: numbers.Limited | None) -> str:
     best = one.best_with
     cost = "does not say what it costs"
     if best.cost is not None:
         cost = f"costs {numbers.money(best.cost, currency)}"
         cost += _more(one.dearer_by, numbers.money(abs(one.dearer_by or 0.0), currency))
-    error = f"has a Syncline error of {numbers.length(best.error_m)}"
-    error += _more(one.worse_by, numbers.length(abs(one.worse_by or 0.0)))
+    error = f"has a Syncline error of {numbers.error(best.error_m, limit)}"
+    error += _more(one.worse_by, numbers.error(abs(one.worse_by or 0.0), limit))
     return f"{cost} and {error}"
 
 

@@ -10,6 +10,7 @@ from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.report.json_out import json_text
 from syncline_design.report.on_choice import figure_front, incomplete_lines
 from syncline_design.report.on_hinges import hinges_nodes
+from syncline_design.report.on_nearest import asked_limit
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.render_html import html
@@ -29,12 +30,13 @@ def on_optimized(found: Optimized) -> Document:
     """The design report with all that the choice hinges on."""
     assert found.verdict is not None
     more: list[Node] = [Text((strong(line),)) for line in incomplete_lines(found.result)]
-    asked = why_not_nodes(found.result.why_not, found.case.spec.currency)
+    limit = asked_limit(found.case, "accuracy")
+    asked = why_not_nodes(found.result.why_not, found.case.spec.currency, limit)
     if asked:
         more += [Heading("Why not"), *asked]
     for section in figure_front(found):
         more += [Heading(section.title), *section.nodes]
-    document = on_verdict(found.verdict, [*more, *hinges_nodes(found.result)])
+    document = on_verdict(found.verdict, [*more, *hinges_nodes(found.result, limit)])
     parts = (replace(part, folded=part.folded and part.key != "choice")
              for part in document.sections)  # fmt: skip
     return replace(document, sections=tuple(parts))

@@ -23,6 +23,7 @@ from syncline_design.report.document import (
     plain,
 )
 from syncline_design.report.table import Table
+from syncline_design.report.text import unticked
 
 WIDTH: Final = 110  # columns of a paragraph at most: longer lines are hard to read
 NO_TERMINAL: Final = (80, 24)
@@ -119,7 +120,7 @@ def _pairs(pairs: Sequence[tuple[str, Inline]], indent: str) -> Iterator[str]:
     narrow = width > columns() // 2
     for label, value in pairs:
         if narrow:
-            yield from _wrapped(f"{label}: {plain(value) or '-'}", f"{indent}  ", indent)
+            yield from _wrapped(f"{plain(label)}: {plain(value) or '-'}", f"{indent}  ", indent)
             continue
         head = f"{indent}{_shown(label).ljust(width)}"
         yield from _wrapped(plain(value) or "-", " " * len(head), head)
@@ -130,12 +131,12 @@ def table_lines(
 ) -> Iterator[str]:
     """A table with its columns lined up, no wider than the terminal."""
     if not silent:
-        yield from _wrapped(shown.caption, f"{indent}  ", indent)
+        yield from _wrapped(unticked(shown.caption), f"{indent}  ", indent)
         indent += "  "
     for line in fitted(shown, columns() - len(indent), paint):
         yield f"{indent}{line}".rstrip()
     if shown.note:
-        yield from _wrapped(shown.note, indent)
+        yield from _wrapped(unticked(shown.note), indent)
 
 
 def aligned(rows: Sequence[Sequence[str]], indent: int = 2) -> list[str]:

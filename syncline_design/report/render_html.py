@@ -11,10 +11,11 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
+from syncline_design.report.columns import padded
 from syncline_design.report.document import Document, charts, for_output, spans
 from syncline_design.report.layout import laid_out
 from syncline_design.report.table import Table, table
-from syncline_design.report.text import visible
+from syncline_design.report.text import unticked, visible
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -89,6 +90,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters["spans"] = spans
+    environment.filters["bare"] = unticked
     environment.tests["wide"] = _is_wide
     environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
@@ -118,8 +120,8 @@ def _values(figure: InlineChart, caption: str) -> Table | None:
     if not 0 < len(figure.told) <= MOST_VALUES:
         return None
     labels = sorted(_labels(figure), key=lambda one: any(one not in t.says for t in figure.told))
-    rows = ([t.says.get(label, "") for label in labels] for t in figure.told)
-    return table(caption, labels, rows)
+    columns = [padded([t.says.get(label, "") for t in figure.told]) for label in labels]
+    return table(caption, labels, zip(*columns, strict=True))
 
 
 def _labels(figure: InlineChart) -> list[str]:

@@ -15,7 +15,7 @@ from urllib.parse import quote
 from syncline_design import __version__
 from syncline_design.report.ci import SILENT, Notice, all_notices
 from syncline_design.report.json_out import json_text
-from syncline_design.report.text import visible
+from syncline_design.report.text import unticked, visible
 from syncline_design.verdict.tree import Checked
 
 SCHEMA_URI: Final = (
@@ -97,13 +97,13 @@ def _result(notice: Notice, rules: list[str]) -> dict[str, Any]:
         "ruleIndex": rules.index(rule),
         "kind": "fail",
         "level": _LEVELS[notice.level],
-        "message": {"text": visible(notice.message)},
+        "message": {"text": visible(unticked(notice.message))},
         "locations": [_location(notice)],
         "partialFingerprints": {"requirement/v1": _fingerprint(notice)},
     }
     if notice.level == "waived":
         result["suppressions"] = [
-            {"kind": "external", "justification": visible(notice.justification)}
+            {"kind": "external", "justification": visible(unticked(notice.justification))}
         ]
     elif notice.level == "known":
         result["baselineState"] = "unchanged"

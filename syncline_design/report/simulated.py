@@ -58,7 +58,7 @@ def ensemble(found: MonteCarlo) -> str:
 
 
 def _sentence(text: str) -> str:
-    return numbers.micro(f"{text[0].upper()}{text[1:].rstrip('.')}.")
+    return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
 def quantiles(found: MonteCarlo) -> Table:

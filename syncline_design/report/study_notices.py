@@ -11,7 +11,7 @@ from syncline_design.report.ci import Level, Notice, requirement_sentence
 from syncline_design.report.github import github_command
 from syncline_design.report.sarif import sarif_log
 from syncline_design.report.study_words import outcome, rule_sentence
-from syncline_design.report.text import visible
+from syncline_design.report.text import unticked, visible
 from syncline_design.studies.finished import CaseResult
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.table import reason
@@ -96,7 +96,7 @@ def study_github(result: StudyResult) -> str:
     """Workflow commands: an annotation per missed requirement, a notice with the outcome."""
     lines = [github_command(finding) for finding in study_notices(result)]
     text = f"{result.study.name}: {outcome(result).word}. {rule_sentence(result)}"
-    return "\n".join([*lines, f"::notice ::{visible(text).replace('%', '%25')}"]) + "\n"
+    return "\n".join([*lines, f"::notice ::{visible(unticked(text)).replace('%', '%25')}"]) + "\n"
 
 
 def study_junit(result: StudyResult) -> str:
@@ -136,7 +136,7 @@ def _test(case: CaseResult, *, allowed: bool) -> ElementTree.Element:
             message = f"{case.verdict}, {sentence_list(list(waived))} waived"
             ElementTree.SubElement(test, "skipped", {"message": visible(message)})
         return test
-    message = visible(" ".join(miss.message for miss in missed))
+    message = visible(unticked(" ".join(miss.message for miss in missed)))
     tag = "error" if case.verdict == "indeterminate" else "failure"
     if allowed:
         ElementTree.SubElement(test, "skipped", {"message": f"{case.verdict}: {message}"})

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Final, Literal
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.report.columns import alike
+from syncline_design.report.text import unticked
 
 Tone = Literal["", "good", "bad", "warn", "muted"]
 CORNER: Final = " \\ "  # in a first heading: between what goes down and what goes across
@@ -21,12 +24,14 @@ class Cell:
     mark: str = ""
     code: bool = False
     sub: str = ""  # a second, quieter line
+    written: bool = False  # as someone wrote it, so to be shown with just these digits
 
 
 def cell_words(cell: Cell) -> str:
     """A cell in one line: its symbol, what it says, and the quieter words in brackets."""
-    sub = f" ({cell.sub})" if cell.sub else ""
-    return f"{cell.mark} {cell.text}{sub}".strip()
+    text = cell.text if cell.code else unticked(cell.text)
+    sub = f" ({unticked(cell.sub)})" if cell.sub else ""
+    return f"{cell.mark} {text}{sub}".strip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +65,19 @@ def table(
     named_by: int = 0,
 ) -> Table:
     """A table; a heading that ends in ` #` is numeric, a plain string is a plain cell."""
-    return Table(
-        caption,
-        tuple(Head(h.removesuffix(" #"), h.endswith(" #")) for h in heads),
-        tuple(tuple(c if isinstance(c, Cell) else Cell(c) for c in row) for row in rows),
-        note,
-        named_by,
-    )
+    shown = tuple(Head(h.removesuffix(" #"), h.endswith(" #")) for h in heads)
+    cells = [[c if isinstance(c, Cell) else Cell(c) for c in row] for row in rows]
+    columns = [
+        _alike(column) if head.numeric else column
+        for head, column in zip(shown, zip(*cells, strict=True), strict=bool(cells))
+    ]
+    return Table(caption, shown, tuple(zip(*columns, strict=True)), note, named_by)
+
+
+def _alike(column: Sequence[Cell]) -> Sequence[Cell]:
+    """A column of figures, all to the same place or to the same number of digits."""
+    texts = alike([(cell.text, None if cell.written else cell.sort) for cell in column])
+    return [
+        cell if cell.text == text else replace(cell, text=text)
+        for cell, text in zip(column, texts, strict=True)
+    ]

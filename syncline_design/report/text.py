@@ -11,6 +11,7 @@ _DIRECTION_OR_BREAK = {
     *range(0x202A, 0x202F), *range(0x2066, 0x206A), 0xFEFF,
 }  # fmt: skip
 _SPREADSHEET_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_MICRO = re.compile(r"(?<=\d) u(?=[smW]\b)")
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~^$])")
 
 
@@ -38,6 +39,24 @@ def visible(text: object) -> str:
     if plain.isascii() and plain.isprintable():
         return plain
     return "".join(_visible_character(ord(c)) or c for c in plain)
+
+
+def ticked(text: str) -> list[str]:
+    """A sentence for people, apart at its backticks: every second part is code.
+
+    An odd backtick stays as it is, with all others.  Outside of code a figure has its micro sign,
+    `up to 24.16 \N{MICRO SIGN}s`, as in tables; specs and commands are written without it.
+    """
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        parts = [text]
+    return [part if k % 2 else _MICRO.sub("\N{NO-BREAK SPACE}\N{MICRO SIGN}", part)
+            for k, part in enumerate(parts)]  # fmt: skip
+
+
+def unticked(text: str) -> str:
+    """The same without its backticks, where nothing shows code in a style of its own."""
+    return "".join(ticked(text))
 
 
 def spreadsheet_safe(text: object) -> str:

@@ -41,7 +41,7 @@ def requirements(verdict: Verdict) -> Table:
             Cell(state.word, tone=state.tone, mark=state.mark),
             kind_text(row),
             Cell(numbers.held(row.value, row), row.value),
-            Cell(numbers.limit(row), row.limit),
+            Cell(numbers.limit(row), row.limit, written=True),
             Cell(margin_text(row), relative_margin(row)),
             f"line {row.line}" if row.line and not row.implied else "implied",
             "; ".join(note for note in notes if note),
@@ -208,10 +208,10 @@ def ledger(syncline: SynclineFigures, limit: RequirementResult | None) -> Table:
         for entry in larger(syncline.ledger)
     ]
     heads = ("Term", "Stage", "Kind", "Value #", "Share #")
-    return table("Terms of the total error", heads, rows, _too_small(syncline))
+    return table("Terms of the total error", heads, rows, _too_small(syncline, limit))
 
 
-def _too_small(syncline: SynclineFigures) -> str:
+def _too_small(syncline: SynclineFigures, limit: RequirementResult | None) -> str:
     """What the terms without a row come to."""
     shown = larger(syncline.ledger)
     rest = math.fsum(e.value_m for e in syncline.ledger) - math.fsum(e.value_m for e in shown)
@@ -219,7 +219,8 @@ def _too_small(syncline: SynclineFigures) -> str:
     if not count:
         return ""
     words = "1 term is" if count == 1 else f"{count} terms are"
-    return f"{words} below 0.1 % of the total and have no row; together {numbers.length(rest)}."
+    together = numbers.error(rest, limit)
+    return f"{words} below 0.1 % of the total and have no row; together {together}."
 
 
 def models(syncline: SynclineFigures, limit: RequirementResult | None) -> Table:

@@ -119,7 +119,6 @@ def _over(
     stage: Stage, does: str, found: float, allowed: float, unit: str, size: float = 1.0
 ) -> str:
     """`uav moves at up to 12 m/s, 10 is allowed for`."""
-    much = (
-        f"up to {to_digits(found / size, 6)} {unit}, {to_digits(allowed / size, 6)} is allowed for"
-    )
-    return f"{stage.name} {does} {much}"
+    texts = ([to_digits(one / size, n) for one in (found, allowed)] for n in range(4, 18))
+    up_to, at_most = next(pair for pair in texts if pair[0] != pair[1])
+    return f"{stage.name} {does} up to {up_to} {unit}, {at_most} is allowed for"

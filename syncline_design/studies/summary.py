@@ -11,6 +11,7 @@ from syncline_design.machine.records import Record, optional
 from syncline_design.studies.definition import Factor
 from syncline_design.studies.finished import CaseResult, Finished
 from syncline_design.studies.record import CasePoint, CaseWord, RolePick
+from syncline_design.verdict.tree import RequirementResult
 
 MOST_FRONTS = 500
 MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
@@ -47,11 +48,15 @@ class StudyFront(Record):
 
 @dataclass(frozen=True, slots=True)
 class StudySummary:
-    """Every case in a line, and the fronts that differ."""
+    """Every case in a line, and the fronts that differ.
+
+    accuracy: the first case's, in the unit of whose limit a page tells errors.
+    """
 
     result: Finished
     briefs: tuple[Brief, ...]
     fronts: tuple[StudyFront, ...]
+    accuracy: RequirementResult | None = None
 
     @property
     def currencies(self) -> tuple[str, ...]:
@@ -107,8 +112,11 @@ def summarise(result: Finished) -> StudySummary:
     """One pass over all cases."""
     briefs: list[Brief] = []
     fronts: dict[tuple[tuple[CasePoint, ...], str], list[int]] = {}
+    accuracy = None
     for case in result.cases():
         briefs.append(_brief(case))
+        asked = (row for row in case.record.requirements if row.kind == "accuracy")
+        accuracy = accuracy or next(asked, None)
         points = case.record.front
         key = (points, case.currency)
         if points and (key in fronts or len(fronts) < MOST_FRONTS):
@@ -116,7 +124,7 @@ def summarise(result: Finished) -> StudySummary:
     found = (
         StudyFront(tuple(cases), currency, points) for (points, currency), cases in fronts.items()
     )
-    return StudySummary(result, tuple(briefs), tuple(found))
+    return StudySummary(result, tuple(briefs), tuple(found), accuracy)
 
 
 def _brief(case: CaseResult) -> Brief:
