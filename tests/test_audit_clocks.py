@@ -360,3 +360,18 @@ def test_a_counter_that_begins_anew_in_a_gap(tmp_path: Path) -> None:
     count = (t + 5.0) % (2.0**24 * 1e-6)
     row = said(tmp_path, count[kept] - BEGAN, transported(t, 1e-3, 17)[kept])
     assert sorted(names(row)) == ["counter_wrap", "gap"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_clock_that_runs_away_and_is_locked_again_is_one_relock(
+    tmp_path: Path, seed: int
+) -> None:
+    """1000 ppm for 30 s, then back with 5 s: what its course is off by is no second fault."""
+    t = even(50.0, 120.0)
+    away = np.where((t > 30.0) & (t <= 60.0), (t - 30.0) * 1e-3, 0.0)
+    away += np.where(t > 60.0, 0.03 * np.exp(-(t - 60.0) / 5.0), 0.0)
+    row = said(tmp_path, t + away, transported(t, 1e-3, seed))
+    assert names(row) == ["relock"]
+    (fault,) = counted(row)
+    assert fault.parameters["seconds"] == pytest.approx(0.03, rel=0.03)
+    assert fault.parameters["settling_s"] == pytest.approx(5.0, rel=0.05)

@@ -92,3 +92,11 @@ def test_stamps_of_events_that_go_back_are_no_threads() -> None:
     places = np.array([60, 170, 320])
     stamp[places] = true[places - 1] - 0.05
     assert named(audited(stamp, noted)) == ["backward_jump"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_events_that_overtake_one_another_within_their_delays(seed: int) -> None:
+    """Moments at random, 20 ms apart in the mean, and delays of 4 ms: no stamp is wrong."""
+    rng = np.random.default_rng(seed)
+    true = np.cumsum(rng.exponential(0.02, 4000))
+    assert named(audited(true, true + 2e-3 + rng.gamma(2.0, 4e-4, true.size))) == []

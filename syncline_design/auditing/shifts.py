@@ -27,7 +27,7 @@ from syncline_design.auditing.witness import Side
 from syncline_design.machine.quick_dataclass import dataclass
 
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
-_REST: Final = 0.02  # of a jump: how well its size is known at once
+_REST: Final = 0.025  # of a jump: how well its size is known at once
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
 _OTHER_TICKS: Final = 3  # receipts that show a tick
 _MOST_OF_TICK: Final = 0.5  # that waits fill, where whole ticks are to be told from others
@@ -81,25 +81,28 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
 def _joined(
     jumps: tuple[StampFault, ...], slow: tuple[StampFault, ...], near_s: float
 ) -> tuple[StampFault, ...]:
-    """Both, but for steps beside a jump that are what its size was off by."""
+    """Both, but for what the size of a step beside, or the course of a lock, was off by."""
     kept = list(jumps)
     rest: list[StampFault] = []
     for fault in slow:
-        k = next((k for k, jump in enumerate(kept) if _is_rest(fault, jump, near_s)), None)
-        if k is None:
+        k = next((k for k, one in enumerate(kept) if _is_rest(fault, one, near_s)), None)
+        if k is not None:
+            size = float(kept[k].parameters["seconds"]) + float(fault.parameters["seconds"])
+            kept[k] = replace(kept[k], parameters={**kept[k].parameters, "seconds": size})
+        elif not any(_is_rest(fault, one, near_s) for one in slow if one.fault == "relock"):
             rest.append(fault)
-            continue
-        size = float(kept[k].parameters["seconds"]) + float(fault.parameters["seconds"])
-        kept[k] = replace(kept[k], parameters={**kept[k].parameters, "seconds": size})
     return (*kept, *rest)
 
 
-def _is_rest(fault: StampFault, jump: StampFault, near_s: float) -> bool:
-    if fault.fault != "step" or jump.fault != "step" or "interval_s" in jump.parameters:
+def _is_rest(fault: StampFault, larger: StampFault, near_s: float) -> bool:
+    """Whether one begins beside a step, or in the course of a lock, of a multiple of its size."""
+    alike = fault.fault in ("step", "relock") and larger.fault in (fault.fault, "relock")
+    if not alike or "interval_s" in larger.parameters or fault.from_s is None:
         return False
-    begins = fault.from_s is not None and jump.from_s is not None
-    near = begins and abs((fault.from_s or 0.0) - (jump.from_s or 0.0)) <= near_s
-    share = abs(float(fault.parameters["seconds"]) / float(jump.parameters["seconds"]))
+    first = larger.from_s or 0.0
+    last = first if larger.fault == "step" else larger.to_s or first
+    near = first - near_s <= fault.from_s <= last + near_s
+    share = abs(float(fault.parameters["seconds"]) / float(larger.parameters["seconds"]))
     return near and share < _REST
 
 

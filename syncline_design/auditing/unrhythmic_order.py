@@ -21,6 +21,7 @@ from syncline_design.auditing.measured_order import LEAST_MESSAGES, course, set_
 from syncline_design.auditing.series import Series
 
 _LITTLE: Final = 0.2  # of an interval
+_AS_DELAYS: Final = 2.0  # and of what nine in ten delays reach
 _MOST_LATE: Final = 4.0  # of what nine in ten delays reach; of gamma-like ones 1 in 10^7 more
 
 
@@ -37,7 +38,7 @@ def order_without_rhythm(series: Series) -> NDArray[np.intp] | None:
     key = stamp + np.round(level).astype(np.int64)
     interval = float(np.ptp(np.percentile(stamp, [5.0, 95.0]))) / (0.9 * places.size)
     nine_in_ten = float(np.subtract(*np.percentile(away, [95.0, 5.0])))
-    reach, little = _MOST_LATE * nine_in_ten, min(_LITTLE * interval, nine_in_ten)
+    reach, little = _MOST_LATE * nine_in_ten, min(_LITTLE * interval, _AS_DELAYS * nine_in_ten)
     for deepest in (reach, little):
         sorted_ = _in_order(key, np.abs(away) <= reach, deepest, little)
         if sorted_ is None or _falls(stamp[sorted_]) >= _falls(stamp):
