@@ -24,9 +24,9 @@ from browsing import flaws_of
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.planning.drives import whole_drive
+from syncline_design.planning.placing import lasting_s
 from syncline_design.planning.result import Plan
 from syncline_design.planning.run import plan as planned
-from syncline_design.planning.search import lasting_s
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.standard import MOST_LEGS, Lines, most_within
 from syncline_design.planning.telling import PlanRun

@@ -31,6 +31,7 @@ from syncline_design.planning.information import (
 )
 from syncline_design.planning.legs import Leg, library, transition
 from syncline_design.planning.path import STEP_S, CourseCommands, PathStates, joined, travelled
+from syncline_design.planning.placing import LegTold, Room, Swept, arranged
 from syncline_design.planning.planned_log import (
     Drive,
     apart,
@@ -39,7 +40,6 @@ from syncline_design.planning.planned_log import (
     planned_log,
     turned,
 )
-from syncline_design.planning.search import LegTold, arranged
 from syncline_design.planning.vehicle import Vehicle
 
 COMPUTED_HZ = 10.0  # rows that are computed; more rows a second count as less noise each
@@ -167,25 +167,38 @@ class World:
         vehicle = self.vehicles[leg.stage]
         path = travelled(vehicle, leg.course)
         turns_s = (transition(vehicle, 0.0).duration_s, transition(vehicle, math.pi).duration_s)
-        moved = path.position_m[-1, :2] - path.position_m[0, :2]
         now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
         return LegTold(
             leg,
             now,
             once,
             twice,
-            (float(moved[0]), float(moved[1])),
+            _swept(path),
             float(path.euler_rad[-1, 2]),
             turns_s,
-            _box(path),
+            self._rooms[leg.stage],
+        )
+
+    @cached_property
+    def _rooms(self) -> tuple[Room | None, ...]:
+        """Where each stage's vehicle has to stay."""
+        return tuple(
+            None
+            if one.area_m is None
+            else Room(
+                one.area_m,
+                tuple(_swept(travelled(one, transition(one, QUARTER * k))) for k in range(-2, 3)),
+            )
+            for one in self.vehicles
         )
 
 
-def _box(path: PathStates) -> tuple[float, float, float, float]:
+def _swept(path: PathStates) -> Swept:
     (south, north), (west, east) = (
         (float(own.min() - own[0]), float(own.max() - own[0])) for own in path.position_m.T[:2]
     )
-    return south, north, west, east
+    north_m, east_m = (float(v) for v in path.position_m[-1, :2] - path.position_m[0, :2])
+    return Swept((north_m, east_m), (south, north, west, east))
 
 
 def _since(time_s: Array, ends: Sequence[int]) -> Array:
@@ -221,23 +234,17 @@ def whole_drive(
 ) -> tuple[tuple[DrivenLeg, ...], list[CourseCommands]]:
     """The legs one after the other with the turns between them: stretches and courses by stage."""
     parts: list[list[CourseCommands]] = [[] for _ in world.vehicles]
-    heading, found, steps = 0.0, [], 0
+    found, steps = [], 0
     for placed in arranged(sequence):
         leg = placed.told.leg
         begun = steps
-        angle = _wrapped(QUARTER * placed.heading - heading)
-        turn = transition(world.vehicles[leg.stage], angle)
+        turn = transition(world.vehicles[leg.stage], placed.turn_rad)
         for course in (turn, leg.course):
             for own, one in zip(parts, world.courses_of(leg.stage, course), strict=True):
                 own.append(one)
             steps += len(course)
-        heading = QUARTER * placed.heading + placed.told.turned_rad
         found.append(DrivenLeg(leg, begun * STEP_S, steps * STEP_S, QUARTER * placed.heading))
     return tuple(found), [joined(own) for own in parts]
-
-
-def _wrapped(angle: float) -> float:
-    return math.remainder(angle, 2.0 * math.pi)
 
 
 @dataclass(frozen=True, eq=False)

@@ -176,7 +176,7 @@ def _reverse(v: Vehicle) -> tuple[str, CourseCommands] | None:
 
 
 def _spin(v: Vehicle) -> tuple[str, CourseCommands] | None:
-    if not v.usual.hovers:
+    if not v.hovers:
         return None
     return "hover and turn once to the right, once to the left", turning(
         v, 0.0, [FULL_RAD, -FULL_RAD]
@@ -185,15 +185,18 @@ def _spin(v: Vehicle) -> tuple[str, CourseCommands] | None:
 
 def _sway(v: Vehicle, sideways: bool) -> tuple[str, CourseCommands] | None:
     """Roll or pitch of a multirotor: to and fro, leaning by what its acceleration takes."""
-    if not v.usual.hovers:
+    if not v.hovers:
         return None
     cycles, lean = 6, min(v.tilt_rad, math.atan(0.8 * v.acceleration_mps2 / GRAVITY_MPS2))
     omega = FULL_RAD * cycles / SWEEP_S
-    swing = min(GRAVITY_MPS2 * math.tan(lean) / omega, 0.4 * v.v_max_mps) * _wave(SWEEP_S, cycles)
+    speed = min(GRAVITY_MPS2 * math.tan(lean) / omega, 0.4 * v.v_max_mps)
+    swing = speed * _wave(SWEEP_S, cycles)
+    rounded = speed * math.exp(-0.5 * (omega * v.usual.rounding_s) ** 2)  # a Gaussian's of a sine
+    leans = math.degrees(math.atan(rounded * omega / GRAVITY_MPS2))
     zero = np.zeros_like(swing)
     axis, name = ("roll", "sideways") if sideways else ("pitch", "to and fro")
     words = f"{axis} sweeps: sway {name} every {to_places(SWEEP_S / cycles, 0)} s, leaning to " \
-            f"{to_places(math.degrees(lean), 0)} deg"  # fmt: skip
+            f"{to_digits(leans, 2)} deg"  # fmt: skip
     return words, _course(zero, right=swing) if sideways else _course(swing)
 
 

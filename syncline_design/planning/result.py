@@ -44,7 +44,9 @@ class Separated(Record):
     """A pair of effects: correlation, noncentrality reached and asked.
 
     noncentrality: twice the log likelihood by which the true effect, of the size stated, beats its
-    rival refitted, on average; sizes: of the first effect's parameters, SI.
+    rival refitted, on average; sizes: of the first effect's parameters, SI.  told_from: of a pair
+    that is not told apart and whose size is not known, the sizes from which this drive tells it, to
+    first order, where they are plausible.
     """
 
     first: str
@@ -54,6 +56,7 @@ class Separated(Record):
     wanted: float
     separated: bool
     sizes: Mapping[str, float]
+    told_from: Mapping[str, float] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

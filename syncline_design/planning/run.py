@@ -9,15 +9,8 @@ from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.planning.drives import WholeDrive, outcome
-from syncline_design.planning.search import (
-    AREA_SHARE,
-    LegSearch,
-    LegTold,
-    best_legs,
-    extent_m,
-    lasting_s,
-    together,
-)
+from syncline_design.planning.placing import AREA_SHARE, LegTold, lasting_s, way_of
+from syncline_design.planning.search import LegSearch, best_legs, together
 from syncline_design.planning.setup import SECONDS, PlanRequest, Setup
 from syncline_design.planning.standard import times_needed
 from syncline_design.planning.telling import PlanRun, Telling, duration_s
@@ -68,7 +61,7 @@ class _Planning:
         area = (min(a[0] for a in areas), min(a[1] for a in areas))
         known = LegSearch(self.setup.told, self.setup.judge, in_force(), area)
         if not any(known.fits([told]) for told in self.setup.told):
-            least = min((extent_m([told]) for told in self.setup.told), key=max)
+            least = min((way_of([told]).extent_m for told in self.setup.told), key=max)
             raise PlanError(
                 f"area [{to_digits(area[0])} m, {to_digits(area[1])} m]: not one leg of this "
                 f"vehicle stays within "

@@ -26,132 +26,20 @@ from syncline_design.planning.information import (
     schur,
     sigmas,
 )
-from syncline_design.planning.legs import Leg
+from syncline_design.planning.placing import LegTold, Place, arranged, lasting_s, way_of
 from syncline_design.planning.wanted import Goal, PairGoal
 
 NONCENTRALITY: Final = 60.0  # at which a rival fits worse by more than 15 nat nine times in ten
 SAME: Final = 0.99  # correlation above which two effects stay one class
-QUARTER_RAD: Final = 0.5 * math.pi
 MOST_LEGS: Final = 240
 MARGIN: Final = 0.95  # of what is asked that the search aims at, for the joints between legs
 LEAST_GAIN: Final = 1e-4
-AREA_SHARE: Final = 0.9  # of the area, for the legs
 SWEEPS: Final = 3
 MOST_EXCHANGED: Final = 12
 INSEPARABLE: Final = 20.0  # times wider: what no drive of the library tells apart
 WIDENED: Final = 3.0  # times that one other effect may widen a sigma
 VAGUE: Final = 30.0  # times the prior: of what a search has not seen yet
 CONFUSED: Final = 0.05  # weight of what other effects take of what is wanted
-
-
-@dataclass(frozen=True, slots=True)
-class LegTold:
-    """What one leg tells at each of the four headings: G00, G0d + Gd0, Gdd, (4, p + 1, p + 1) each,
-    the last row and column what the noise shifts.
-
-    moved_m: displacement of the leg flown northwards; turned_rad: its net turn.  turns_s: time to
-    the next leg straight on, and after a turn about.  box_m: south, north, west and east end of
-    the leg driven northwards.
-    """
-
-    leg: Leg
-    now: Array
-    once: Array
-    twice: Array
-    moved_m: tuple[float, float]
-    turned_rad: float
-    turns_s: tuple[float, float]
-    box_m: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-
-    def turn_s(self, angle_rad: float) -> float:
-        """Time of the turn to its heading."""
-        straight, about = self.turns_s
-        share = abs(math.remainder(angle_rad, 2.0 * math.pi)) / math.pi
-        return straight + share * (about - straight)
-
-    def at(self, heading: int, start_s: float) -> Array:
-        """Information of the leg when it begins so late."""
-        found: Array = (
-            self.now[heading] + start_s * self.once[heading] + start_s**2 * self.twice[heading]
-        )
-        return found
-
-
-@dataclass(frozen=True, slots=True)
-class Placed:
-    """A leg in its place: which of the four headings, and when it begins, its turn done."""
-
-    told: LegTold
-    heading: int
-    start_s: float
-
-    @property
-    def end_s(self) -> float:
-        """When it ends."""
-        return self.start_s + self.told.leg.duration_s
-
-
-@dataclass(frozen=True, slots=True)
-class LegsEnd:
-    """Where some legs end: north and east [m], which of the four headings the last one had, the
-    heading now, and when."""
-
-    place_m: tuple[float, float] = (0.0, 0.0)
-    before: int = 0
-    heading_rad: float = 0.0
-    end_s: float = 0.0
-
-    def then(self, told: LegTold) -> tuple[Placed, LegsEnd]:
-        """One more leg, at the heading that ends nearest to the start, the way back first."""
-        moved = [_turned(told.moved_m, h) for h in range(4)]
-        ends = [(self.place_m[0] + north, self.place_m[1] + east) for north, east in moved]
-        costs = [
-            round(math.hypot(*end) + 1e-6 * ((h - self.before - 2) % 4), 5)
-            for h, end in enumerate(ends)
-        ]
-        heading = costs.index(min(costs))
-        begins_rad = QUARTER_RAD * heading
-        placed = Placed(told, heading, self.end_s + told.turn_s(begins_rad - self.heading_rad))
-        return placed, LegsEnd(ends[heading], heading, begins_rad + told.turned_rad, placed.end_s)
-
-
-def arranged(sequence: Sequence[LegTold]) -> tuple[Placed, ...]:
-    """Every leg at its heading and time."""
-    way, found = LegsEnd(), []
-    for told in sequence:
-        placed, way = way.then(told)
-        found.append(placed)
-    return tuple(found)
-
-
-def way_of(sequence: Sequence[LegTold]) -> LegsEnd:
-    """Where the legs of a sequence end."""
-    way = LegsEnd()
-    for told in sequence:
-        way = way.then(told)[1]
-    return way
-
-
-def _turned(moved: tuple[float, float], heading: int) -> tuple[float, float]:
-    cos, sin = ((1, 0), (0, 1), (-1, 0), (0, -1))[heading]
-    return moved[0] * cos - moved[1] * sin, moved[0] * sin + moved[1] * cos
-
-
-def extent_m(sequence: Sequence[LegTold]) -> tuple[float, float]:
-    """North to south and east to west [m] that the legs take, without the turns between them."""
-    place, low, high = np.zeros(2), np.zeros(2), np.zeros(2)
-    for one in arranged(sequence):
-        south, north, west, east = one.told.box_m
-        for corner in ((south, west), (south, east), (north, west), (north, east)):
-            at = place + np.array(_turned(corner, one.heading))
-            low, high = np.minimum(low, at), np.maximum(high, at)
-        place = place + np.array(_turned(one.told.moved_m, one.heading))
-    return float(high[0] - low[0]), float(high[1] - low[1])
-
-
-def lasting_s(sequence: Sequence[LegTold]) -> float:
-    """Of all legs with the turns between them."""
-    return way_of(sequence).end_s
 
 
 def together(sequence: Sequence[LegTold]) -> Array:
@@ -294,6 +182,18 @@ def noncentrality_of(information: Array, pair: PairGoal) -> float:
     )
 
 
+def told_from(information: Array, pair: PairGoal) -> Array | None:
+    """Sizes of the effect named first from which it is told apart, where its size is not known.
+
+    To first order the noncentrality grows with the square of the size, so that two effects whose
+    correlation makes them one class are told apart all the same where one is large.
+    """
+    if pair.known:
+        return None
+    found = noncentrality(information, pair.first, pair.second, pair.sizes)
+    return pair.sizes * math.sqrt(NONCENTRALITY / found) if found > 0.0 else None
+
+
 @dataclass(slots=True)
 class LegSearch:
     """A search over legs for a judge; where the time is over it stops with what it has."""
@@ -301,16 +201,11 @@ class LegSearch:
     legs: tuple[LegTold, ...]
     judge: PlanJudge
     deadline: Deadline
-    area_m: tuple[float, float] | None = None
+    area_m: Place | None = None
 
     def fits(self, sequence: Sequence[LegTold]) -> bool:
-        """Whether the legs stay within the area, with room for the turns between them."""
-        if self.area_m is None:
-            return True
-        return all(
-            own <= AREA_SHARE * most
-            for own, most in zip(extent_m(sequence), self.area_m, strict=True)
-        )
+        """Whether the legs and the turns between them stay within the area."""
+        return self.area_m is None or way_of(sequence).within(self.area_m)
 
     def value(self, sequence: Sequence[LegTold]) -> tuple[float, float]:
         return self.judge.value(together(sequence))
@@ -339,7 +234,7 @@ class LegSearch:
         way, known = way_of(plan), together(plan)
         for told in self.legs:
             placed, after = way.then(told)
-            if after.end_s > most_s or not self.fits([*plan, told]):
+            if after.end_s > most_s or not after.within(self.area_m):
                 continue
             loss, worse = self.judge.value(known + told.at(placed.heading, placed.start_s))
             worth = (value - worse) / (after.end_s - way.end_s)
@@ -393,7 +288,8 @@ def best_legs(
         return whole, whole
     plan = search.grown([], most_s)
     if not plan:  # not one leg fits: the shortest shows what it would take
-        return [min(search.legs, key=lambda told: lasting_s([told]))], whole
+        fitting = [told for told in search.legs if search.fits([told])] or search.legs
+        return [min(fitting, key=lambda told: lasting_s([told]))], whole
     if not search.reaches(plan):
         plan = search.bettered(plan, most_s)
     return plan, whole

@@ -29,12 +29,8 @@ from syncline_design.planning.information import (
 )
 from syncline_design.planning.legs import Leg
 from syncline_design.planning.path import joined
-from syncline_design.planning.search import (
-    LegTold,
-    PlanJudge,
-    others_of,
-    pair_ratio,
-)
+from syncline_design.planning.placing import LegTold
+from syncline_design.planning.search import PlanJudge, others_of, pair_ratio
 from syncline_design.planning.vehicle import vehicles
 from syncline_design.planning.wanted import (
     Goal,

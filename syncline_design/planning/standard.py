@@ -18,7 +18,8 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.legs import FULL_RAD, LINE_S, Leg
 from syncline_design.planning.path import STEP_S, CourseCommands
-from syncline_design.planning.search import LegTold, PlanJudge
+from syncline_design.planning.placing import LegTold
+from syncline_design.planning.search import PlanJudge
 from syncline_design.planning.vehicle import Vehicle
 
 LEAST_TURN_RAD: Final = math.radians(10.0)  # what lines that do not turn may wander

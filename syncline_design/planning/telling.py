@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Final
 
@@ -18,7 +18,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_digits
+from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.model.system import System
 from syncline_design.planning.drives import WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
@@ -44,6 +44,7 @@ from syncline_design.planning.search import (
     NONCENTRALITY,
     noncentrality_of,
     pair_ratio,
+    told_from,
 )
 from syncline_design.planning.setup import SECONDS, Setup
 from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
@@ -128,7 +129,7 @@ class Telling:
             ),
             flown=self._flown(),
             sized=bool(self.setup.world.beyond) or None,
-            cautions=self._cautions() or None,
+            cautions=(*self._cautions(), *self._beyond_areas(found.driven)) or None,
         )
         vehicle = self.setup.world.vehicles[found.stretches[-1].leg.stage]
         others = {
@@ -141,6 +142,17 @@ class Telling:
     def _cautions(self) -> tuple[str, ...]:
         found = self.setup.request.diagnosis
         return () if found is None else cautions_of(self.setup.case, self.setup.system, found)
+
+    def _beyond_areas(self, driven: Drive) -> Iterator[str]:
+        """Vehicles that leave their area, in words."""
+        for vehicle, states in zip(self.setup.world.vehicles, driven.states, strict=True):
+            taken = np.ptp(states.position_m[:, :2], axis=0)
+            if vehicle.area_m is not None and np.any(taken > vehicle.area_m):
+                own, most = (
+                    f"{to_places(north, 0)} m by {to_places(east, 0)} m"
+                    for north, east in (taken, vehicle.area_m)
+                )
+                yield f"The drive of {vehicle.stage} takes {own}, beyond its area of {most}."
 
     def _tolerance(self) -> dict[str, float]:
         pairs = zip(self.setup.goal.wanted, self.setup.goal.tolerance, strict=True)
@@ -167,14 +179,22 @@ class Telling:
         )
 
     def _separated(self, information: Array, pair: PairGoal) -> Separated:
-        names = [self.setup.world.every[k].parameter.name for k in pair.first]
+        own = [self.setup.world.every[k].parameter for k in pair.first]
+        names = [one.name for one in own]
+        apart = pair_ratio(information, pair) <= 1.0
+        larger = None if apart else told_from(information, pair)
+        if larger is not None and any(
+            size > one.high for one, size in zip(own, larger, strict=True)
+        ):
+            larger = None
         return Separated(
             *pair.names,
             canonical_correlation(information, pair.first, pair.second),
             noncentrality_of(information, pair),
             NONCENTRALITY,
-            pair_ratio(information, pair) <= 1.0,
+            apart,
             dict(zip(names, map(float, pair.sizes), strict=True)),
+            None if larger is None else dict(zip(names, map(float, larger), strict=True)),
         )
 
     def _confused(self, information: Array) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import math
 from typing import Final, Literal, NamedTuple
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_digits
+from syncline_design.model.figure_text import format_duration, to_digits
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw
@@ -23,6 +23,7 @@ SEA_TILT: Final = 3.0  # the horizon's tilt is so many standard deviations of th
 SEA_RATE_SHARE: Final = 0.12  # of omega_max that the sea's own turn rate is at most (rms)
 MOST_TILT_RAD: Final = math.radians(30.0)
 BELOW: Final = ("mbes", "sonar", "usbl", "echo", "imaging_sonar", "multibeam")
+LONGEST_TURN_S: Final = 3600.0  # a turn about that takes longer is none
 HEIGHT_SHARE: Final = 0.6  # of the range d that the targets lie below
 
 
@@ -76,6 +77,11 @@ class Vehicle:
         return USUAL[self.motion]
 
     @property
+    def hovers(self) -> bool:
+        """Whether it stands still and turns there: not where a turning radius is stated."""
+        return self.usual.hovers and self.turn_radius_m == 0.0
+
+    @property
     def fast_mps(self) -> float:
         """The speed of a fast leg."""
         return max(SHARE * self.v_max_mps, self.slowest_mps)
@@ -83,7 +89,7 @@ class Vehicle:
     @property
     def wait_mps(self) -> float:
         """The speed at which it waits while another vehicle drives."""
-        return 0.0 if self.usual.hovers else max(self.slowest_mps, self.fast_mps / 3.0)
+        return 0.0 if self.hovers else max(self.slowest_mps, self.fast_mps / 3.0)
 
     @property
     def join_mps(self) -> float:
@@ -91,7 +97,7 @@ class Vehicle:
 
         There radius and acceleration bind alike, v / R = 0.8 a / v.
         """
-        if self.usual.hovers:
+        if self.hovers:
             return 0.0
         quickest = math.sqrt(ACROSS * self.acceleration_mps2 * self.turn_radius_m)
         return min(max(self.wait_mps, quickest), self.fast_mps)
@@ -132,7 +138,7 @@ def _vehicle(case: Case, stage: StageCase, ranging_type: str) -> Vehicle:
     if entry.minimum_speed is None and slowest > 0.0:
         assumed.append(f"minimum_speed: {to_digits(slowest, 3)} m/s")
     tilt = min(float(case.spec.horizon.tilt), MOST_TILT_RAD)
-    return Vehicle(
+    found = Vehicle(
         stage.choice.name,
         motion,
         v_max,
@@ -146,6 +152,8 @@ def _vehicle(case: Case, stage: StageCase, ranging_type: str) -> Vehicle:
         _area(entry.area),
         tuple(assumed),
     )
+    _demand_turns(case, stage, found)
+    return found
 
 
 def _usual_acceleration(usual: Usual, v_max: float) -> float:
@@ -181,14 +189,31 @@ def _depth_m(
 def _demand_motion(case: Case, stage: StageCase, v_max: float, omega: float) -> None:
     for key, value, cannot in (("omega_max", omega, "turn"), ("v_max", v_max, "move")):
         if value <= 0.0:
-            path = ("stages", stage.index, "platform")
-            flaw = Flaw(
-                str(case.path),
-                *case.position(path),
-                f"stages.{stage.index}.platform.{key}",
-                f"the platform of stage {stage.choice.name!r} cannot {cannot} ({key} is 0), and "
-                f"what tells effects apart is how it {cannot}s",
-                f"{key} above 0",
-                hint="state what the vehicle of the test drive can do",
-            )
-            raise BadInput((flaw,))
+            raise _cannot(case, stage, key, cannot, f"{key} is 0", f"{key} above 0")
+
+
+def _demand_turns(case: Case, stage: StageCase, found: Vehicle) -> None:
+    """BadInput where a turn about takes longer than any drive, with the figure that binds."""
+    rate = found.turn_radps(found.join_mps)
+    if rate * LONGEST_TURN_S >= math.pi:
+        return
+    tight = found.turn_radius_m > 0.0 and rate < TURN_SHARE * found.omega_max_radps
+    key = "minimum_turn_radius" if tight else "omega_max"
+    most = format_duration(LONGEST_TURN_S)
+    why = f"a turn about at {to_digits(found.join_mps, 3)} m/s takes longer than {most}"
+    raise _cannot(case, stage, key, "turn", why, f"a turn about within {most}")
+
+
+def _cannot(
+    case: Case, stage: StageCase, key: str, cannot: str, why: str, expected: str
+) -> BadInput:
+    flaw = Flaw(
+        str(case.path),
+        *case.position(("stages", stage.index, "platform")),
+        f"stages.{stage.index}.platform.{key}",
+        f"the platform of stage {stage.choice.name!r} cannot {cannot} ({why}), and what tells "
+        f"effects apart is how it {cannot}s",
+        expected,
+        hint="state what the vehicle of the test drive can do",
+    )
+    return BadInput((flaw,))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import field
 from typing import Final
 
@@ -19,6 +20,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import UnitError, parse_quantity, suffix_unit
 from syncline_design.model.system import System
+from syncline_design.model.unit_table import Dimension
 from syncline_design.planning.information import Unknown
 from syncline_design.spec.fields import did_you_mean
 
@@ -118,7 +120,7 @@ def _stated_sizes(one: NamedEffect, amount: str) -> dict[str, float]:
     for key, text in zip(names, parts, strict=True):
         try:
             kind = suffix_unit(key)[1]
-            found[key] = float(parse_quantity(_numbered(text.strip()), kind, tolerance=False))
+            found[key] = _amount(text.strip(), kind)
         except UnitError as error:
             raise PlanError(f"{where}: {key} is no such quantity: {error}") from None
     if not any(found.values()) or not all(map(math.isfinite, found.values())):
@@ -157,7 +159,7 @@ def _tolerance(one: NamedEffect, amount: str) -> float:
     problem = None
     for name, kind in kinds.items():
         try:
-            value = float(parse_quantity(_numbered(amount), kind, tolerance=False))
+            value = _amount(amount, kind)
         except UnitError as error:
             problem = f"--reach {one.text}={amount}: {name} is no such quantity: {error}"
             continue
@@ -167,12 +169,15 @@ def _tolerance(one: NamedEffect, amount: str) -> float:
     raise PlanError(problem or f"--reach {one.text}: nothing to reach")
 
 
-def _numbered(amount: str) -> object:
-    """A bare number as one: scales and rates have no unit."""
-    try:
-        return float(amount)
-    except ValueError:
-        return amount
+def _amount(text: str, kind: Dimension) -> float:
+    """A figure in SI; scales and rates are bare or have a unit of a ratio, as in `20 ppm`."""
+    number: object = text
+    with suppress(ValueError):
+        number = float(text)
+    if number is text and kind is Dimension.DIMENSIONLESS:
+        with suppress(UnitError):
+            return float(parse_quantity(text, Dimension.RATIO, tolerance=False))
+    return float(parse_quantity(number, kind, tolerance=False))
 
 
 @dataclass(frozen=True, slots=True)

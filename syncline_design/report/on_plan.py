@@ -73,7 +73,10 @@ def _outcome(found: Plan) -> Outcome:
     legs = f"{len(found.legs)} leg{'s' if len(found.legs) != 1 else ''}"
     length = _minutes(found.duration_s / 60.0)
     if found.reached:
-        return Outcome("good", "\u2713", f"Reached by {legs} in {length}")
+        rest = ", but for what no drive tells" if found.inseparable else ""
+        return Outcome("good", "\u2713", f"Reached by {legs} in {length}{rest}")
+    if _larger(found) is not None:
+        return Outcome("bad", "\u2717", "Told apart only where it is larger")
     if found.least_minutes is None:
         return Outcome("bad", "\u2717", "Not reachable: no drive of this platform tells it")
     return Outcome("bad", "\u2717", f"Not reachable in {numbers.number(found.minutes, 6)} min")
@@ -89,16 +92,43 @@ def _sentences(found: Plan) -> Iterator[Inline]:
             below = f"No drive as short as {given} was found: below is one of {length}."
         yield f"The least that is enough: {least}. {below}"
     for words in found.inseparable:
-        yield f"No drive of this platform tells {words} apart, {_how_far(found)}."
+        larger = _larger(found)
+        if larger is not None and words == f"{larger.first} and {larger.second}":
+            yield from _told_where_larger(larger)
+        else:
+            yield f"No drive of this platform tells {words} apart, {_how_far(found)}."
     if found.reached and not found.confused:
+        asked = "else that" if found.inseparable else "that"
         yield (
-            "All that is asked is reached, and none of the other effects that a drive can tell "
+            f"All {asked} is asked is reached, and none of the other effects that a drive can tell "
             "apart would take it, left free one at a time."
         )
     if found.confused:
         names = ", ".join(map(effect_words, found.confused))
         yield f"Left free one at a time, these would take it: {names}."
     yield from found.cautions or ()
+
+
+def _larger(found: Plan) -> Separated | None:
+    """The pair that this drive tells apart where the first effect is larger."""
+    return next((one for one in found.pairs if one.told_from), None)
+
+
+def _told_where_larger(one: Separated) -> Iterator[Inline]:
+    """A pair of which only the size decides whether it can be told."""
+    sizes = one.told_from or {}
+    yield (
+        f"{one.first} and {one.second} look nearly alike on every drive (correlation "
+        f"{_correlation(one.correlation)}), so that a small effect is not told. From "
+        f"{' and '.join(figure(name, size) for name, size in sizes.items())} of the first on, the "
+        "drive below tells them apart. Where its size is known, --separate with "
+        f"{one.first}=SIZE plans for it."
+    )
+
+
+def _correlation(value: float) -> str:
+    """To two figures, and to more where two would make one of it."""
+    return numbers.number(value, 2 if value < 0.995 else 4)
 
 
 def _how_far(found: Plan) -> str:
@@ -131,7 +161,7 @@ def _facts(found: Plan) -> Iterator[tuple[str, str]]:
         asks = "" if asked is None else f" (asked: {figure(key, asked, asked)})"
         yield parameter(key), words + asks
     if last.correlation is not None:
-        yield "Correlation of the pair", numbers.number(last.correlation, 2)
+        yield "Correlation of the pair", _correlation(last.correlation)
 
 
 def figure(key: str, value: float | None, like: float | None = None) -> str:
@@ -194,7 +224,7 @@ def _after(found: Plan) -> list[Node]:
     def row(name: str, values: Mapping[str, float], correlation: float | None = None) -> Row:
         shown = [Cell(figure(k, values[k], sizes[k]) if k in values else "", _sort(values.get(k)))
                  for k in keys]  # fmt: skip
-        last = "" if correlation is None else numbers.number(correlation, 2)
+        last = "" if correlation is None else _correlation(correlation)
         return (name, *shown, Cell(last))
 
     rows = [row(one.leg, one.sigma, one.correlation) for one in found.after]
@@ -227,7 +257,7 @@ def _pair_text(one: Separated) -> str:
     said = "told apart" if one.separated else "not told apart"
     return (
         f"{one.first} of {sizes} from {one.second}: {said}; correlation "
-        f"{numbers.number(one.correlation, 2)}, noncentrality "
+        f"{_correlation(one.correlation)}, noncentrality "
         f"{numbers.number(one.noncentrality, 3)} of {numbers.number(one.wanted, 3)}"
     )
 
@@ -262,7 +292,7 @@ def _standard_row(
         name,
         reached,
         *(Cell(figure(k, sigma[k], sizes[k]), _sort(sigma[k])) for k in keys),
-        Cell("" if correlation is None else numbers.number(correlation, 2)),
+        Cell("" if correlation is None else _correlation(correlation)),
     )
 
 
@@ -271,7 +301,7 @@ def _flown(flown: Flown | None) -> list[Node]:
         return []
     lines = [f"{parameter(key)}: {figure(key, value)}" for key, value in flown.sigma.items()]
     if flown.correlation is not None:
-        lines.append(f"correlation {numbers.number(flown.correlation, 2)}")
+        lines.append(f"correlation {_correlation(flown.correlation)}")
     said = "reaches what is asked" if flown.reached else "does not reach what is asked"
     files = ", ".join(flown.files)
     words = f"{files}: {numbers.count(flown.rows)} rows, {numbers.time(flown.duration_s)}; {said}."

@@ -1,0 +1,156 @@
+"""What binds a drive: the area it has, how the vehicle turns, what it leans to, and how large an
+effect has to be; and figures as people write them."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import syncline_design as sd
+from syncline_design.planning.drives import outcome
+from syncline_design.planning.legs import library
+from syncline_design.planning.path import travelled
+from syncline_design.planning.run import plan as planned
+from syncline_design.planning.setup import PlanRequest, Setup
+from syncline_design.planning.telling import PlanRun, Telling
+from syncline_design.planning.vehicle import vehicles
+from syncline_design.planning.wanted import PlanWanted, separate_of
+from syncline_design.report.plans import render_plan
+from syncline_design.spec.load import load
+from tests.planned_specs import SPEC, call
+
+PAIR = ("heading_bias(attitude)", "boresight(ranging)")
+AREA_M = (150.0, 80.0)
+
+
+def spec_with(folder: Path, *changes: tuple[str, str]) -> Path:
+    text = SPEC
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "spec.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def car(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return spec_with(
+        tmp_path_factory.mktemp("car"),
+        ("motion: multirotor", "motion: ground"),
+        ("area: [250 m, 250 m]", "area: [150 m, 80 m]"),
+    )
+
+
+@pytest.fixture(scope="module")
+def alike(car: Path) -> PlanRun:
+    """Two effects with a correlation above 0.99 on every drive of a level vehicle."""
+    return planned_alone(car, *PAIR)
+
+
+def planned_alone(path: Path, first: str, second: str) -> PlanRun:
+    wanted = PlanWanted(pairs=separate_of(first, second))
+    return planned(load(path), PlanRequest(wanted, minutes=4.0, line_plans=False))
+
+
+def test_a_drive_of_many_turns_stays_within_its_area(alike: PlanRun) -> None:
+    """A car's turns take it aside: the whole path counts, the turns between the legs too."""
+    assert len(alike.result.legs) > 3
+    taken = np.ptp(alike.path.position_m[:, :2], axis=0)
+    assert taken[0] <= AREA_M[0]
+    assert taken[1] <= AREA_M[1]
+    assert alike.result.cautions is None
+
+
+def test_a_drive_that_leaves_its_area_is_said_to(car: Path) -> None:
+    """Of a vehicle that has less room than the drive was made for."""
+    wanted = PlanWanted(pairs=separate_of(*PAIR))
+    setup = Setup.begun(load(car), PlanRequest(wanted, minutes=4.0, line_plans=False))
+    tight = replace(setup.world.vehicles[0], area_m=(150.0, 20.0))
+    told = setup.told[:1]
+    setup = replace(setup, world=replace(setup.world, vehicles=(tight,)))
+    run = Telling(setup).whole(outcome(setup.world, told), None, 240.0)
+    (caution,) = run.result.cautions or ()
+    north, east = np.ptp(run.path.position_m[:, :2], axis=0)
+    assert f"takes {north:.0f} m by {east:.0f} m, beyond its area of 150 m by 20 m" in caution
+
+
+def test_effects_that_look_alike_are_told_apart_where_one_is_large(
+    alike: PlanRun, car: Path
+) -> None:
+    """That no drive tells two effects is said of small ones: of such a size this drive does."""
+    (pair,) = alike.result.pairs
+    assert not pair.separated
+    assert 0.99 < pair.correlation < 1.0
+    size = (pair.told_from or {})["bias_rad"]
+    found = planned_alone(car, f"{PAIR[0]}={1.05 * size} rad", PAIR[1]).result
+    assert found.reached
+    assert found.duration_s <= alike.result.duration_s + 1.0
+    words = " ".join(render_plan("markdown", alike).split())
+    assert "No drive of this platform" not in words
+    assert f"From {math.degrees(size):.3g} deg of the first on" in words
+    assert "Correlation of the pair 1 " not in words
+
+
+def test_a_copter_with_a_turning_radius_is_planned_for(tmp_path: Path) -> None:
+    """It does not turn on the spot then, and none of its turns is tighter."""
+    path = spec_with(
+        tmp_path,
+        ("motion: multirotor", "motion: multirotor, minimum_turn_radius: 6 m"),
+        (", area: [250 m, 250 m]", ""),
+    )
+    run = sd.plan(path, reach="latency(position)=1 ms, lever_arm(position)=1 cm")
+    speed = np.linalg.norm(run.path.velocity_mps[:, :2], axis=1)
+    turn = np.abs(np.gradient(np.unwrap(run.path.euler_rad[:, 2]), run.path.time_s))
+    assert run.result.reached
+    assert turn.max() > 0.05
+    assert np.all(speed >= 0.97 * 6.0 * turn - 0.02)
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        ("minimum_turn_radius", ("motion:", "minimum_turn_radius: 1000 km, motion:")),
+        ("omega_max", ("omega_max: 50 deg/s", "omega_max: 0.001 deg/s")),
+    ],
+)
+def test_a_platform_that_as_good_as_cannot_turn_is_refused(
+    key: str, change: tuple[str, str], tmp_path: Path
+) -> None:
+    done = call(spec_with(tmp_path, change))
+    assert done.exit_code == 2
+    words = " ".join(done.stderr.split())
+    assert f"platform.{key}: the platform of stage 'vehicle' cannot turn" in words
+
+
+def test_sweeps_lean_to_what_is_said(tmp_path: Path) -> None:
+    """The words are for who flies, the attitudes what the figures rest on."""
+    (copter,) = vehicles(load(spec_with(tmp_path)), ("lidar",))
+    for name, axis in (("roll sweeps", 0), ("pitch sweeps", 1)):
+        leg = next(one for one in library(copter, 0) if one.name == name)
+        most = math.degrees(np.abs(travelled(copter, leg.course).euler_rad[:, axis]).max())
+        said = float(leg.words.removesuffix(" deg").split()[-1])
+        assert said == pytest.approx(most, rel=0.05)
+
+
+def test_what_no_drive_tells_is_not_said_to_be_reached(tmp_path: Path) -> None:
+    path = spec_with(tmp_path)
+    rivals = "lever_arm(position), filter_lag(position)"
+    done = call(path, "--separate", "latency(position)=5 ms", rivals)
+    assert done.exit_code == 0
+    words = " ".join(done.stdout.split())
+    assert "but for what no drive tells" in words
+    assert "All else that is asked is reached" in words
+
+
+@pytest.mark.parametrize("effect", ["range_scale(ranging)", "clock_drift(position)"])
+def test_scales_and_rates_are_read_in_ppm(effect: str, tmp_path: Path) -> None:
+    path = spec_with(tmp_path)
+    done = call(path, "--reach", f"{effect}=900 ppm", "--minutes", 4, "-o", "json:-")
+    (asked,) = json.loads(done.stdout)["tolerance"].values()
+    assert asked == pytest.approx(9e-4)
