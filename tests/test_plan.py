@@ -345,20 +345,6 @@ def test_a_drive_that_is_driven_names_what_was_hidden(pair: PlanRun, spec: Path)
         assert value == pytest.approx(pair.result.after[-1].sigma[key], rel=0.05)
 
 
-def test_a_flown_log_that_the_platform_cannot_have_made_is_said_to_be_odd(
-    straight: tuple[Path, Path], tmp_path: Path
-) -> None:
-    """Some vehicle's log with a spec of another, ten times slower one."""
-    fast = tmp_path / "fast.yaml"
-    text = straight[0].read_text("utf-8")
-    speed = next(line for line in text.splitlines() if "v_max:" in line).split("v_max:")[1]
-    own = speed.split(",")[0].split("m/s")[0].strip()
-    fast.write_text(text.replace(f"v_max: {own} m/s", "v_max: 0.5 m/s"), encoding="utf-8")
-    done = call(fast, "--reach", "latency(position)=100 ms", "--flown", straight[1], "-o", "json:-")
-    flown = json.loads(done.stdout)["flown"]
-    assert any("the spec's v_max is 0.5 m/s" in one for one in flown["cautions"])
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [

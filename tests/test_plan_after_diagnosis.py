@@ -139,3 +139,17 @@ def test_a_class_that_no_drive_tells_is_said_to_be_one(
     assert ends.why_none is not None
     assert "lever_arm(position) from lever_arm(ranging)" in ends.why_none
     assert ends.legs == ()
+
+
+def test_a_flown_log_that_the_platform_cannot_have_made_is_said_to_be_odd(
+    straight: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Some vehicle's log with a spec of another, ten times slower one."""
+    fast = tmp_path / "fast.yaml"
+    text = straight[0].read_text("utf-8")
+    speed = next(line for line in text.splitlines() if "v_max:" in line).split("v_max:")[1]
+    own = speed.split(",")[0].split("m/s")[0].strip()
+    fast.write_text(text.replace(f"v_max: {own} m/s", "v_max: 0.5 m/s"), encoding="utf-8")
+    done = call(fast, "--reach", "latency(position)=100 ms", "--flown", straight[1], "-o", "json:-")
+    flown = json.loads(done.stdout)["flown"]
+    assert any("the spec's v_max is 0.5 m/s" in one for one in flown["cautions"])
