@@ -20,7 +20,7 @@ from syncline_design.comparison.acceptance import (
 )
 from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_log import by_log
-from syncline_design.comparison.judgement import Judgement, together
+from syncline_design.comparison.judgement import OF_PLACES, Judgement, together
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.built import Sighted
@@ -295,6 +295,8 @@ def test_one_that_breaks_beats_one_that_holds_and_both_beat_silence() -> None:
     assert together(case, one, [silent, holds]).status == "holds"
     assert together(case, one, [silent]).status == "not_shown"
     assert together(case, one, []).status == "not_shown"
+    assert together(case, one, [silent, OF_PLACES]).evidence == "not_shown"
+    assert together(case, one, [OF_PLACES]).evidence == OF_PLACES.words
 
 
 def test_every_effect_breaks_something_that_its_sensor_is_asked_for() -> None:

@@ -11,7 +11,7 @@ import pytest
 from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.spec.load import BadInput, load
 from tests.acceptance_samples import ROOT, run
-from tests.clock_logs import sessions_csv, statistics_line, tracking_line
+from tests.clock_logs import sessions_csv, statistics_line, tracking, tracking_line, write
 
 CLOCKED = """\
 syncline: 1
@@ -93,6 +93,29 @@ def test_the_log_of_a_clock_that_the_spec_does_not_name_counts(
     assert (row["assumption"], row["assumed"], row["status"]) == ("clock", 0.0, status), row
     assert words in row["evidence"]
     assert done.exit_code == {"holds": 0, "broken": 1, "not_shown": 3}[status]
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_daemon_s_own_bound_shows_no_clock_to_be_off(clocked: Path, named: bool) -> None:
+    """Offsets of 0.1 ms by a path whose half round trip is 20 ms: nothing shows that the clock is
+    off by more than 1 ms, nor that it is not."""
+    if not named:
+        text = CLOCKED.replace("    clock: {candidates: [own]}\n", "")
+        clocked.write_text(text, "utf-8")
+    source, logs = np.random.default_rng(4), []
+    for day in range(20):
+        times = 1.7e9 + 86400.0 * day + 16.0 * np.arange(400)
+        folder = clocked.parent / f"day{day}"
+        folder.mkdir()
+        logs.append(write(folder / "tracking.log",
+                          tracking(times, source.normal(0.0, 1e-4, 400), hard_s=2e-2)))  # fmt: skip
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert (row["status"], done.exit_code) == ("not_shown", 3), row
+    assert "no session was" in row["evidence"]
+    assert "it is the daemon's own" in row["evidence"]
+    assert 3e-4 < row["measured"]["low"] < 5e-4  # what three sigma hold, in the worst session
+    assert row["measured"]["high"] == pytest.approx(2e-2, rel=0.01)
 
 
 def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:

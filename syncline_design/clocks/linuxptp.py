@@ -21,7 +21,7 @@ _INTEGER: Final = r"([-+]?\d{1,18})"
 # Every repeat has an end: a hostile line costs no more than its length.
 _GAP: Final = r"\s{1,16}"
 _SAMPLE: Final = re.compile(
-    rf"(?:(?P<what>[\w/.-]{{1,64}})\s{{1,4}})?(?:(?:master|phc|sys)\s{{1,4}})?offset{_GAP}{_INTEGER}"
+    rf"(?:(?P<what>[\w/.-]{{1,64}})\s{{1,4}})?(?:(?P<against>master|phc|sys)\s{{1,4}})?offset{_GAP}{_INTEGER}"
     rf"{_GAP}s(\d)(?:{_GAP}freq{_GAP}{_INTEGER})?(?:{_GAP}(?:path{_GAP})?delay{_GAP}{_INTEGER})?"
 )
 _SUMMARY: Final = re.compile(
@@ -31,6 +31,8 @@ _SUMMARY: Final = re.compile(
 _LOST: Final = re.compile(r"port \d{1,5}[^:]{0,64}: SLAVE to (?!SLAVE)|link down")
 _STARTED: Final = re.compile(r"INITIALIZING to LISTENING on INIT_COMPLETE|selected /dev/ptp\d+ as")
 _UNIX: Final = 1e9
+SYSTEM: Final = "phc2sys CLOCK_REALTIME"
+FOLLOWS_SYSTEM: Final = " by the system clock"  # the name's end of a card in a `sys offset` line
 RESOLUTION_S: Final = 0.5e-9  # of whole nanoseconds
 _MOST: Final = 512  # characters before and behind a program's name
 _RANKS: Final = {"phc2sys": 1, "ptp4l": 2, "ts2phc": 3}
@@ -85,10 +87,11 @@ class PtpReader:
         found = _SAMPLE.search(body)
         summary = None if found else _SUMMARY.search(body)
         if found is not None:
-            _, offset, state, freq, delay = found.groups()
+            _, against, offset, state, freq, delay = found.groups()
             locked = int(state) >= 2
         elif summary is not None:
             _, _, offset, freq, delay = summary.groups()
+            against = None
             locked = True
         else:
             return None
@@ -101,7 +104,7 @@ class PtpReader:
         )
         if key[0] == "phc2sys" and (what or "phc").strip() == "phc":
             what = "CLOCK_REALTIME"  # older versions name only the side that they compare with
-        kind = _kind(key, what, time_s)
+        kind = _kind(key, what, time_s, by_system="sys" in (what, against))
         self.last[key] = kind
         restart = key in self.began
         self.began.discard(key)
@@ -109,11 +112,14 @@ class PtpReader:
         return kind, Row(time_s, offset_s, hard, locked, rate, restart=restart), ""
 
 
-def _kind(key: tuple[str, str], what: str | None, time_s: float) -> SourceKind:
+def _kind(key: tuple[str, str], what: str | None, time_s: float, *, by_system: bool) -> SourceKind:
+    """by_system: whether the card follows the system clock, which most are held against."""
     program, tag = key
     named = (what or "").strip()
     if program == "ptp4l" or named in ("master", "phc", "sys"):
         named = tag
     stamps: TimeBase = "utc" if time_s >= _UNIX else "boot"
     name = f"{program} {named}".strip()
+    if program == "phc2sys" and by_system:
+        name += FOLLOWS_SYSTEM
     return SourceKind(name, "linuxptp", _RANKS[program], _STEERING[program], stamps)

@@ -12,6 +12,7 @@ _DAYS: Final = range(_MJD_EPOCH, 90000)
 _STATUS: Final = re.compile(r"[0-9a-fA-F]{4}")
 _SELECTED: Final = 6  # sys.peer; 7: pps.peer
 
+PEERSTATS: Final = "ntpd peerstats"
 LOOPSTATS: Final = SourceKind("ntpd loopstats", "ntpd", 1, "servo", "utc")
 
 
@@ -42,5 +43,5 @@ def _peer(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str]:
     offset, delay, dispersion = map(float, cells[4:7])
     hard = abs(offset) + delay / 2.0 + dispersion
     selected = (int(cells[3], 16) >> 8) & 7 >= _SELECTED
-    kind = SourceKind(f"ntpd peerstats {cells[2]}", "ntpd", 2, "servo", "utc", cells[2])
+    kind = SourceKind(f"{PEERSTATS} {cells[2]}", "ntpd", 2, "servo", "utc", cells[2])
     return kind, Row(time_s, -offset, hard), cells[2] if selected else ""

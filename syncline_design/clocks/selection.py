@@ -10,8 +10,10 @@ from typing import Final
 import numpy as np
 
 from syncline_design.clocks.files import refused
+from syncline_design.clocks.linuxptp import FOLLOWS_SYSTEM, SYSTEM
+from syncline_design.clocks.ntpd import LOOPSTATS, PEERSTATS
 from syncline_design.clocks.result import ClockEntryKind
-from syncline_design.clocks.series import ClockSeries
+from syncline_design.clocks.series import Array, ClockSeries
 from syncline_design.clocks.sessions import sessions_of
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -26,6 +28,8 @@ SIGNS: Final = {
     "ppstest": "clock - whole second in the log",
     "CSV": "local - reference by the column's name",
 }
+LAST_POLLS: Final = 10.0  # polls that a peer's bound is taken to last
+POLLED_TOGETHER_S: Final = 1.0  # a poll's line in peerstats and in loopstats are of one moment
 _LINUXPTP_SIGN: Final = "local - reference in the log"
 
 
@@ -47,7 +51,7 @@ def select(
     series: Sequence[ClockSeries], wanted: str | None, kind: ClockEntryKind, first: Path
 ) -> SourceSelection:
     """The source asked for, or the one that says most of the clock; refused where none does."""
-    series = [*series, *_chained(series)]
+    series = [*_bounded_by_peers(series), *_chained(series)]
     names = list(dict.fromkeys(one.kind.name for one in series))
     if wanted is not None:
         chosen = [name for name in names if name == wanted] or [
@@ -57,13 +61,22 @@ def select(
             found = "no such source" if not chosen else "several sources of that name"
             raise refused(first, f"--source {wanted}: {found}", expected="one of the sources",
                           found=", ".join(names))  # fmt: skip
-        return _split(series, chosen[0], ())
+        return _split(series, chosen[0], _what_phc2sys_compares(chosen[0]))
     usable = [one for one in series if kind == "timestamping" or not _is_serial(one)]
     if not usable:
         raise refused(
             first, "gpsd TOFF alone holds the latency of the serial line: no evidence of the clock",
             expected="PPS messages too",
             hint="--entry timestamping makes a method of it: stamping on arrival",
+        )  # fmt: skip
+    usable = [one for one in usable if kind == "timestamping" or not _follows_system(one)]
+    if not usable:
+        raise refused(
+            first, "phc2sys `sys offset` tells how well a card follows the system clock: no "
+            "evidence of the system clock itself",
+            expected="what disciplines the system clock (chrony, ntpd, phc2sys `phc offset`)",
+            found=", ".join(names), hint="--source NAME takes it for a clock all the same; "
+            "--entry timestamping makes a method of it",
         )  # fmt: skip
     families = sorted({one.kind.family for one in usable})
     if len(families) > 1:
@@ -75,6 +88,11 @@ def select(
 
 def _is_serial(one: ClockSeries) -> bool:
     return one.kind.family == "gpsd" and one.kind.reference == "TOFF"
+
+
+def _follows_system(one: ClockSeries) -> bool:
+    """A card that is steered by the system clock, as where the host is the grandmaster."""
+    return one.kind.name.startswith("phc2sys") and one.kind.name.endswith(FOLLOWS_SYSTEM)
 
 
 def _ranked(usable: Sequence[ClockSeries], series: Sequence[ClockSeries]) -> SourceSelection:
@@ -90,12 +108,22 @@ def _ranked(usable: Sequence[ClockSeries], series: Sequence[ClockSeries]) -> Sou
         names.sort(key=lambda name: -largest[name])
         notes.append(f"of {len(names)} sources alike, {names[0]} has the largest offsets and is "
                      "used; --source NAME takes another")  # fmt: skip
-    if names[0].startswith("phc2sys"):
-        notes.append("phc2sys compares the system clock with the card: how far the card is from "
-                     "the reference (ptp4l, ts2phc) is not in these logs")  # fmt: skip
+    notes += _what_phc2sys_compares(names[0])
     kept = {s.kind.name: s for s in usable}
     series = [replace(s, kind=kept[s.kind.name].kind) if s.kind.name in kept else s for s in series]
     return _split(series, names[0], tuple(notes))
+
+
+def _what_phc2sys_compares(name: str) -> tuple[str, ...]:
+    """What has to be said of it where it is used."""
+    if not name.startswith("phc2sys"):
+        return ()
+    if name == SYSTEM:
+        return ("phc2sys compares the system clock with the card: how far the card is from the "
+                "reference (ptp4l, ts2phc) is not in these logs",)  # fmt: skip
+    with_what = "the system clock" if name.endswith(FOLLOWS_SYSTEM) else "another clock"
+    return (f"{name}: a card that is compared with {with_what}; how far either is from the "
+            "reference, and the host's clock from either, is not in these logs",)  # fmt: skip
 
 
 def _level(series: Sequence[ClockSeries]) -> float:
@@ -122,6 +150,36 @@ def _independent_refclocks(series: Sequence[ClockSeries]) -> tuple[list[ClockSer
     return found, list(dict.fromkeys(notes))
 
 
+def _bounded_by_peers(series: Sequence[ClockSeries]) -> list[ClockSeries]:
+    """Loopstats with the bound of the peers that ntpd selected at the time.
+
+    loopstats hold neither delays nor dispersions; peerstats of the same daemon do.  Of several
+    selected peers the largest bound counts, which is no smaller than that of whichever steered.
+    """
+    selected = [s for s in series if s.kind.reference and s.kind.reference in s.references]
+    peers = [s for s in selected if s.kind.name.startswith(PEERSTATS)]
+    return [_with_bound(s, peers) if s.kind == LOOPSTATS and peers else s for s in series]
+
+
+def _with_bound(loop: ClockSeries, peers: Sequence[ClockSeries]) -> ClockSeries:
+    bounds = np.array([_last_bound(peer, loop.time_s) for peer in peers])
+    known = np.any(np.isfinite(bounds), axis=0)
+    hard = np.max(np.where(np.isfinite(bounds), bounds, 0.0), axis=0)
+    hard = np.maximum(hard, np.abs(loop.offset_s))
+    return replace(loop, hard_s=np.where(known, hard, np.nan))
+
+
+def _last_bound(peer: ClockSeries, time_s: Array) -> Array:
+    """A peer's bound at its last poll before each moment, where that is not long ago."""
+    order = np.argsort(peer.time_s, kind="stable")
+    polled, hard = peer.time_s[order], peer.hard_s[order]
+    last = np.searchsorted(polled, time_s + POLLED_TOGETHER_S, side="right") - 1
+    reach = LAST_POLLS * float(np.median(np.diff(polled))) if len(polled) > 1 else 0.0
+    heard = (last >= 0) & (time_s - polled[np.maximum(last, 0)] <= max(reach, 1.0))
+    bound: Array = np.where(heard, hard[np.maximum(last, 0)], np.nan)
+    return bound
+
+
 def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> SourceSelection:
     used = tuple(one for one in series if one.kind.name == name)
     return SourceSelection(used, tuple(one for one in series if one.kind.name != name), notes)
@@ -130,7 +188,7 @@ def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> 
 def _chained(series: Sequence[ClockSeries]) -> list[ClockSeries]:
     """The system clock against the reference: phc2sys (system - card) + ptp4l or ts2phc (card -
     reference), where both are there."""
-    system = [s for s in series if s.kind.name == "phc2sys CLOCK_REALTIME"]
+    system = [s for s in series if s.kind.name == SYSTEM]
     for program in ("ptp4l", "ts2phc"):
         cards = [s for s in series if s.kind.name.startswith(program)]
         names = {s.kind.name for s in cards}

@@ -38,6 +38,7 @@ from syncline_design.clocks.tolerance import (
     tolerance_bound,
     unseen_share,
 )
+from syncline_design.clocks.trend import running_off
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
@@ -346,11 +347,14 @@ def _notes(
         said.append(f"sessions of {format_duration(min(lengths))} to "
                     f"{format_duration(max(lengths))}: the claim is for such a mixture, "
                     "drift makes long ones worse")  # fmt: skip
+    off = running_off([s for s in sessions if s.is_counted], figures.statistical_s)
+    if off is not None:
+        said.append(off)
     total = sum(len(s.events) for s in sessions)
     if total > MOST_EVENTS:
         said.append(f"{total} events, of which the {MOST_EVENTS} largest are listed")
     if figures.hard_s is None and figures.bound_s is not None:
-        said.append("no hard bound: these logs hold no dispersions or delays")
+        said.append("no hard bound: what is used of these logs holds no dispersions or delays")
     return said
 
 

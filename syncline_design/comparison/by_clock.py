@@ -31,7 +31,7 @@ class Resting:
 
 
 def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
-    """Holds only with a claim about future sessions; beyond the assumed bound it is broken."""
+    """Holds only with a claim about future sessions; broken by a session beyond the bound."""
     found = study.timing
     if found.doubts:
         return Judgement("not_shown", f"the clock logs are in doubt: {found.doubts[0]}")
@@ -40,9 +40,8 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
     figure = MeasuredFigure(found.bound_s, min(seen_s(found), found.bound_s), found.bound_s)
     asked, measured = format_duration(one.value), format_duration(found.bound_s)
     if found.bound_s > one.value and seen_s(found) <= one.value:
-        said = (f"measured bound {measured}, more than the {asked} assumed, but no session was "
-                "beyond that: more sessions would narrow the bound")  # fmt: skip
-        return Judgement("not_shown", said, figure)
+        said = f"measured bound {measured}, more than the {asked} assumed, but no session was "
+        return Judgement("not_shown", said + f"beyond that: {narrowed_by(found)}", figure)
     if found.bound_s > one.value:
         times = f"{to_digits(found.bound_s / one.value, 3)} times" if one.value else "not"
         said = f"measured bound {measured}, {times} the {asked} assumed"
@@ -54,9 +53,20 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
 
 
 def seen_s(found: Timing) -> float:
-    """What these logs themselves show: the worst session, and the daemon's own bound."""
-    quantiles = [s.quantile_s or 0.0 for s in found.sessions if s.counted]
-    return max([*quantiles, found.hard_bound_s or 0.0])
+    """What these logs themselves show the clock to be off by: the worst session.
+
+    The daemon's own bound is none of it: half a round trip is how far the clock may be off, not
+    how far it is.
+    """
+    return max((s.quantile_s or 0.0 for s in found.sessions if s.counted), default=0.0)
+
+
+def narrowed_by(found: Timing) -> str:
+    """What would make a bound less that no session reached."""
+    if found.bound_s != found.hard_bound_s:
+        return "more sessions would narrow the bound"
+    return ("it is the daemon's own, of the delays and dispersions of the path; a shorter path, or "
+            "a measurement that does not take it (a pulse), would narrow it")  # fmt: skip
 
 
 def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:

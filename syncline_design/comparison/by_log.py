@@ -19,7 +19,7 @@ from syncline_design.comparison.in_doubt import (
     likeliest,
     widened_by,
 )
-from syncline_design.comparison.judgement import Judgement
+from syncline_design.comparison.judgement import OF_PLACES, Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
@@ -244,7 +244,7 @@ def _doubt(one: Assumed, log: LogEvidence) -> str:
 def _nothing_found(one: Assumed, log: LogEvidence) -> Judgement:
     """Holds where the log would have shown whatever turns the verdict."""
     if one.name in ("timing", "clock"):
-        return Judgement("not_shown", "a log of places alone does not show a bound of stamps")
+        return OF_PLACES
     figure = _noise_figure(one, log) if one.name == "noise" else _seen(one, log)
     hidden = list(_hidden(one, log))
     if hidden:

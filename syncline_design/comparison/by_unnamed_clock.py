@@ -7,7 +7,7 @@ from dataclasses import replace
 from syncline_design.clocks.study import TimingStudy
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
-from syncline_design.comparison.by_clock import Resting, by_clock, seen_s
+from syncline_design.comparison.by_clock import Resting, by_clock, narrowed_by, seen_s
 from syncline_design.comparison.clock_meaning import on_clock
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.model.figure_text import format_duration
@@ -51,7 +51,9 @@ def by_unnamed_clock(
             return Judgement("holds", words, figure)
         return Judgement("not_shown", f"{words}: {rest.words}", figure)
     if checked(replace(study, timing=replace(study.timing, bound_s=least_s))).verdict == "meets":
-        words = "would turn the verdict, but no session was as far off: more would narrow it"
+        words = (
+            f"would turn the verdict, but no session was as far off: {narrowed_by(study.timing)}"
+        )
         return Judgement("not_shown", f"{lead} {words}", figure)
     failed = ", ".join(row.id for row in after.requirements if row.status == "fail")
     words = f"{lead}, in place of 0 s, fails {failed}: name the clock in the spec (timing --as)"

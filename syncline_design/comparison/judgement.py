@@ -33,6 +33,7 @@ class Judgement:
 
 
 NO_EVIDENCE = Judgement("not_shown", "none of these logs tells of it")
+OF_PLACES = Judgement("not_shown", "a log of places alone does not show a bound of stamps")
 
 
 def together(case: Case, one: Assumed, said: Sequence[Judgement]) -> AssumptionResult:
@@ -40,6 +41,7 @@ def together(case: Case, one: Assumed, said: Sequence[Judgement]) -> AssumptionR
     statuses = [each.status for each in said]
     status = "holds" if "holds" in statuses and "broken" not in statuses else worst(statuses)
     telling = [each for each in said if each.status == status] or [NO_EVIDENCE]
+    telling = [each for each in telling if each != OF_PLACES] or telling  # where it is not alone
     line, column = case.position(one.key)
     place = next((each for each in telling if each.from_s is not None), telling[0])
     return AssumptionResult(
