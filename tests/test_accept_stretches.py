@@ -134,19 +134,40 @@ def test_delays_stand_out_however_short(size_s: float, lasts_s: float, tmp_path:
     assert from_s - 1.0 < first.from_s < first.to_s < to_s + 1.0
 
 
-def test_a_mount_that_slips_stands_out(tmp_path: Path) -> None:
-    """The last tenth of the rows is that of a vehicle whose ranging sensor is turned by 0.5 deg."""
+def slipping(folder: Path, share: float) -> tuple[Path, Path]:
+    """Spec and log of a vehicle whose ranging sensor is turned by 0.5 deg after a share of it."""
     run = world("multirotor_lines", 9)
-    spec, log = files(tmp_path, run)
+    spec, log = files(folder, run)
     sound = log.read_text("utf-8").splitlines()
     turned = make_log(run, (hidden("boresight", "ranging", x_rad=0.009, y_rad=0.0, z_rad=0.0),))
-    other = turned.to_csv(tmp_path / "turned.csv").read_text("utf-8").splitlines()
-    at = 1 + 9 * len(sound) // 10
+    other = turned.to_csv(folder / "turned.csv").read_text("utf-8").splitlines()
+    at = 1 + round(share * len(sound))
     log.write_text("\n".join([*sound[:at], *other[at:]]) + "\n", "utf-8")
-    first = seen(spec, log).stands[0]
+    return spec, log
+
+
+def test_a_mount_that_slips_stands_out(tmp_path: Path) -> None:
+    """The last tenth of the rows is that of a vehicle whose ranging sensor is turned by 0.5 deg."""
+    first = seen(*slipping(tmp_path, 0.9)).stands[0]
     assert first.sure
     assert ("boresight", "ranging", 0) in (first.label, *first.others)
     assert first.from_s == pytest.approx(54.0, abs=1.0)
+
+
+def test_a_mount_that_slips_half_way_is_broken_from_then_on(tmp_path: Path) -> None:
+    """The diagnosis finds it, and calls it a word for something else: arms do not come and go."""
+    spec, log = slipping(tmp_path, 0.5)
+    told = accept(load(spec), [log], AcceptSettings(("mounting",)), seed=0)
+    assert told.exit_code == 1, told.assumptions
+    (group,) = told.groups
+    assert len(group.rows) == 2
+    for row in told.assumptions:
+        assert row.one_of == 1
+        assert row.measured is not None
+        assert row.measured.low is not None
+        assert row.measured.high is not None
+        assert row.measured.low < 0.009 < row.measured.high
+        assert row.from_s == pytest.approx(30.0, abs=1.0)
 
 
 @pytest.mark.parametrize(("name", "wander"), [("multirotor_lines", 0.0), ("car_stops", 0.5)])

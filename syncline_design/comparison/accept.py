@@ -30,6 +30,7 @@ from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_fi
 from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
+from syncline_design.comparison.shapes import once_changed
 from syncline_design.comparison.stamp_meaning import held_against
 from syncline_design.comparison.suspects import grouped
 from syncline_design.diagnosis.built import sighted
@@ -139,6 +140,7 @@ def _diagnosed(
         return None
     pinned = as_measured(case, seed)
     sight = sighted(pinned, places, DiagnosisSettings(seed=seed, unseen_block=False))
+    sight = replace(sight, found=once_changed(sight.found))
     paper = OnPaper.beside(pinned, sight.found, seed)
     return LogEvidence.of(sight, paper, case.stages[-1].choice.name, _clocks(case, rests_on))
 

@@ -22,6 +22,7 @@ from syncline_design.comparison.in_doubt import (
 from syncline_design.comparison.judgement import OF_PLACES, Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper, size_of
+from syncline_design.comparison.shapes import beside_shapes, shapes
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.noise_split import NoiseFactors
 from syncline_design.diagnosis.result import Finding, Smallest
@@ -57,7 +58,9 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
         said = _broken(one, breaking, standing, _noise_figure(one, log), _readings(log.split(one)))
         undone = list(log.parts.undone(one, _width(said.measured)))
         said = _but_for(said, undone, log.parts.room_undone(one), _is_signed(one))
-        return said if one.name == "noise" else _or_more(one, said, log)
+        if one.name == "noise":
+            return said
+        return beside_shapes(one, _or_more(one, said, log), log, signed=_is_signed(one))
     moved = [each for each in shifts(one, log.found) if log.is_sure(one, each.finding)]
     shifted = by_shifts(one, moved, log.paper)
     if shifted is not None and shifted.status == "broken":
@@ -183,6 +186,11 @@ def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) ->
     figure = _noise_figure(one, log)
     if one.name != "noise" or figure is None or figure.low is None or figure.high is None:
         return None
+    if breaking and figure.high <= 1.0 and all(_is_scatter(f) for f in breaking):
+        most = to_digits(figure.high, 3)
+        words = (f"{_said(breaking[0])}, but {one.role} readings scatter {most} times the spec's "
+                 "figure at most: this log cannot tell whose it is")  # fmt: skip
+        return Judgement("not_shown", words, figure)
     whole = all(registry()[f.effect].opens == "factor" for f in breaking)
     if not breaking or not whole or figure.low > 1.0:
         return None
@@ -194,6 +202,15 @@ def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) ->
     words = (f"noise beyond the spec's, of {one.role} or {' or '.join(others)}: this log cannot "
              f"tell whose ({_said(breaking[0])})")  # fmt: skip
     return Judgement("not_shown", words, figure)
+
+
+def _is_scatter(finding: Finding) -> bool:
+    """Whether it says how far a sensor's readings scatter, as their figure does."""
+    return finding.kind == "noise" and registry()[finding.effect].opens in (
+        "factor",
+        "slow",
+        "down",
+    )
 
 
 def _is_shape(one: Assumed, finding: Finding, log: LogEvidence) -> bool:
@@ -228,7 +245,7 @@ def _doubt(one: Assumed, log: LogEvidence) -> str:
         first = next(c for c in found.checks if c.severity == "contradiction")
         return f"the log contradicts itself or the spec: {first.message}"
     if found.verdict == "unexplained":
-        near = "; ".join(f.sentence for f in found.findings if f.material and f.kind == "stand_in")
+        near = "; ".join(f.sentence for f in shapes(found))
         near = f" (the nearest word for it: {near})" if near else ""
         return f"the log disagrees with the spec and the cause has no name{near}: nothing is shown"
     for finding in found.findings:

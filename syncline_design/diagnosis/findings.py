@@ -30,6 +30,7 @@ from syncline_design.diagnosis.search import VARIES
 from syncline_design.diagnosis.sensor_tails import sensor_tails
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.spans import span_of
+from syncline_design.diagnosis.stretches import is_inside
 from syncline_design.diagnosis.unlike_readings import Unlike, factor_effect
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
@@ -152,7 +153,7 @@ def _undone(one: Finding, other: Label | None) -> Finding:
         return one
     name, sensor, _ = other
     words = f"{one.sentence}; {name} ({sensor}) undoes nearly all of it, so neither is shown"
-    return replace(one, kind="stand_in", sentence=words)
+    return replace(one, kind="stand_in", sentence=words, changed_once=None)
 
 
 def _without_chance(one: Finding) -> Finding:
@@ -198,13 +199,15 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
     named = _finding(final, one.effect, one.label, found, size_m, weights)
     if one.label in final.refuted:
         named = replace(named, kind="stand_in")
-    return _along_the_log(final, one, _in_its_part(named, one.effect))
+    part = _in_its_part(named, one.effect, final.data.view.log.ends_s)
+    return _along_the_log(final, one, part)
 
 
-def _in_its_part(named: Finding, effect: Effect) -> Finding:
+def _in_its_part(named: Finding, effect: Effect, ends_s: tuple[float, float]) -> Finding:
     """The finding with the part of the log that it is cut to.
 
-    What is built in does not come and go: cut to a part it is the word for something else.
+    What is built in does not come and go: cut to a part it is the word for something else, unless
+    it changed once.
     """
     span = span_of(effect)
     if span is None:
@@ -212,7 +215,9 @@ def _in_its_part(named: Finding, effect: Effect) -> Finding:
     first, last = (format_estimate(end, None, "s") for end in (span.from_s, span.to_s))
     words = f"{named.sentence}, from {first} to {last}"
     kind = named.kind if effect.passing else "stand_in"
-    return replace(named, sentence=words, kind=kind, from_s=span.from_s, to_s=span.to_s)
+    once = kind != named.kind == "cause" and not is_inside(span.from_s, span.to_s, ends_s)
+    return replace(named, sentence=words, kind=kind, from_s=span.from_s, to_s=span.to_s,
+                   changed_once=once or None)  # fmt: skip
 
 
 def _along_the_log(final: Settled, one: Acting, named: Finding) -> Finding:

@@ -129,6 +129,8 @@ class Finding(Record):
     another one every varying_over_s, in stretches so long, varying_std their standard deviation.
     also: other sensors that share it, of a delay of a whole system.
     from_s, to_s: the stamps between which it acts, where it does so in a part of the log alone.
+    changed_once: of what is built in, that its being cut to a part that one end of the log ends is
+    all that makes it a stand-in: it does not come and go, but a knock may have changed it.
     readings: of a sensor's noise, deviations over the spec's by reading, where they are unlike.
     scope: of several logs together, whether it is one value in all (build), one a start of the
     system, or one a log; per_log: its values where it is not one.  each_log: what every log by
@@ -160,6 +162,7 @@ class Finding(Record):
     also: tuple[str, ...] | None = optional()
     from_s: float | None = optional()
     to_s: float | None = optional()
+    changed_once: bool | None = optional()
     scope: Scope | None = optional()
     per_log: tuple[PerLog, ...] | None = optional()
     one_value: float | None = optional()

@@ -1,0 +1,64 @@
+"""What a diagnosis has but a word for: what changed once, and what adds to a broken row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.departing import of_finding
+from syncline_design.comparison.in_doubt import Suspicion, widened_by
+from syncline_design.comparison.judgement import Judgement
+from syncline_design.comparison.log_evidence import LogEvidence
+from syncline_design.diagnosis.result import Diagnosis, Finding
+from syncline_design.effects import registry
+
+MOUNTED: Final = ("lever_arm", "mounting")  # what a knock changes
+
+
+def shapes(found: Diagnosis) -> tuple[Finding, ...]:
+    """Material findings that are the best word for something that has no name."""
+    return tuple(f for f in found.findings if f.material and f.kind == "stand_in")
+
+
+def once_changed(found: Diagnosis) -> Diagnosis:
+    """The diagnosis, where all that has no name is what is built in and changed once: explained.
+
+    An arm or a mounting does not come and go, so a diagnosis does not call one that is off for a
+    part of a log the cause.  A knock changes it for good, though.  It is the cause where with it
+    nothing but noise is left, from it to the log's end or from the log's beginning to it.  A survey
+    or a reading that is off from then on is none: that is what a wrong fix looks like.
+    """
+    words = shapes(found)
+    settled = found.sound and not found.remaining.beyond_noise
+    if found.verdict != "unexplained" or not settled or not words:
+        return found
+    if not all(one.changed_once and registry()[one.effect].breaks in MOUNTED for one in words):
+        return found
+    causes = tuple(replace(f, kind="cause") if f in words else f for f in found.findings)
+    left = replace(found.remaining, unexplained=False, material=False)
+    return replace(found, verdict="explained", findings=causes, remaining=left)
+
+
+def beside_shapes(one: Assumed, said: Judgement, log: LogEvidence, *, signed: bool) -> Judgement:
+    """What is broken, with an interval that holds what a word for something else adds to it.
+
+    A delay that grows and then stays may be told as a drift and a delay on top: neither is the
+    whole of it.
+    """
+    adding = [f for f in shapes(log.found) if _adds(one, f, log)]
+    if said.status != "broken" or not adding:
+        return said
+    figures = [Suspicion(((None, log.figure(one, of_finding(f))),)) for f in adding]
+    words = f"{said.words}; on top of what is not its name: {_sentences(adding)}"
+    return replace(said, words=words, measured=widened_by(said.measured, figures, signed))
+
+
+def _adds(one: Assumed, finding: Finding, log: LogEvidence) -> bool:
+    """Whether it would be of the same row, were it the name."""
+    return finding.effect in registry() and log.breaks(one, of_finding(finding))
+
+
+def _sentences(found: Sequence[Finding]) -> str:
+    return "; ".join(f.sentence for f in found)
