@@ -17,11 +17,13 @@ from syncline_design.report.axes import log_ticks
 from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_diagnosis import NAT, on_diagnosis
+from syncline_design.report.on_study import shown_value
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.spec.load import load_text
+from syncline_design.studies.definition import Factor
 from syncline_design.verdict.optimize import (
     OptimizeSettings,
     optimize,
@@ -198,8 +200,23 @@ def test_a_diagram_of_clocks_has_names_in_full_where_three_lines_hold_them() -> 
     sensor = Stamped("uav \u00b7 position", name, "time-of-validity pulse", method, False,
                      1.208e-5, None, True)  # fmt: skip
     short = replace(sensor, sensor="SBG", method="GPIO")
-    drawn = clocks([ClockedVehicle("uav", (sensor, short), "a clock", None)])
+    clock = "OCXO, set from PPS, four hours without GNSS"
+    drawn = clocks([ClockedVehicle("uav", (sensor, short), clock, 7.3e-5)])
     texts = re.findall(r"<text[^>]*>([^<]*)</text>", drawn.svg)
     said = " ".join(texts)
-    assert all(word in said for word in (*name.split(), *method.split(), "pulse"))
+    assert all(word in said for word in (*name.split(), *method.split(), *clock.split(), "pulse"))
     assert "\u2026" not in said
+
+
+@pytest.mark.parametrize(
+    ("label", "shown"),
+    [("2.92522 m/s", "2.925 m/s"), ("0.0123456 deg", "0.01235 deg"), ("12 m", "12 m"),
+     ("0.123456", "0.1235"), ("12.3456 %", "12.3456 %"), ("38412.5 EUR", "38412.5 EUR"),
+     ("sbg_apogee", "sbg_apogee")],
+)  # fmt: skip
+def test_drawn_values_have_four_figures_and_listed_ones_all_of_theirs(
+    label: str, shown: str
+) -> None:
+    drawn = Factor("key", (label,), "sample", (), listed=False)
+    assert shown_value(drawn, label).replace("\u00a0", " ") == shown
+    assert shown_value(Factor("key", (label,), "grid", ()), label) == label

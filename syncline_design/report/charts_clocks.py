@@ -25,7 +25,8 @@ ROW: Final = 44.0  # height of a sensor's row with one line of each, and below
 STEP: Final = 15.0  # from line to line
 HEAD: Final = 20.0  # of a vehicle's name [SVG units]
 BOX, HOST, UTC, BAR = 112.0, 268.0, 318.0, 18.0  # right end of the boxes; left ends; width
-LETTERS: Final = 18, 28  # in a line of a box, in one above or below an arrow
+LETTERS: Final = 17, 28  # in a line of a box, in one above or below an arrow
+CLOCK_LETTERS: Final = 40  # in a line of a clock's name
 MOST_LINES: Final = 3  # of a name: a longer one is cut, its tooltip has it in full
 
 
@@ -59,7 +60,7 @@ class ClockedVehicle:
 def clocks(vehicles: Sequence[ClockedVehicle], name: str = "fig-clocks") -> InlineChart:
     """Sensors to the left, clocks to the right, tau on every arrow between them."""
     rows = sum(_high(one) for vehicle in vehicles for one in vehicle.sensors)
-    height = HEAD + (HEAD + ROW) * len(vehicles) + rows
+    height = HEAD + HEAD * len(vehicles) + rows + sum(map(_clock_high, vehicles))
 
     def build(figure: Figure) -> None:
         figure.set_layout_engine("none")
@@ -100,18 +101,24 @@ def _high(one: Stamped) -> float:
     return ROW + STEP * max(in_box, at_arrow)
 
 
+def _clock_high(vehicle: ClockedVehicle) -> float:
+    """Height of the row of a vehicle's own clock."""
+    return ROW + STEP * (len(_lines(vehicle.clock, CLOCK_LETTERS)) - 1)
+
+
 def _vehicle(axes: Axes, vehicle: ClockedVehicle, top: float) -> float:
     """One vehicle from `top` downwards; where it ends."""
     axes.text(4.0, top + 0.5 * HEAD, shortened(vehicle.name, 40), va="center", color=MUTED)
     first = top + HEAD
     end = first + sum(map(_high, vehicle.sensors))
-    _bar(axes, HOST, first, end + ROW - 8.0, "host clock", SERIES[0])
+    bottom = end + _clock_high(vehicle)
+    _bar(axes, HOST, first, bottom - 8.0, "host clock", SERIES[0])
     above = first
     for one in vehicle.sensors:
         _sensor(axes, one, above + 0.5 * _high(one))
         above += _high(one)
-    _to_utc(axes, vehicle, end + 0.5 * ROW - 4.0)
-    return end + ROW
+    _to_utc(axes, vehicle, bottom - 0.5 * ROW - 4.0)
+    return bottom
 
 
 def _bar(axes: Axes, left: float, top: float, bottom: float, words: str, colour: str) -> None:
@@ -156,8 +163,8 @@ def _to_utc(axes: Axes, vehicle: ClockedVehicle, y: float) -> None:
         f"within {numbers.time(vehicle.offset_s, 3)}"
     )  # fmt: skip
     _arrow(axes, HOST + BAR, UTC, y, MUTED)
-    axes.text(HOST - 5.0, y - 7.0, shortened(vehicle.clock, 40), ha="right", va="center",
-              color=MUTED)  # fmt: skip
+    for k, words in enumerate(reversed(_lines(vehicle.clock, CLOCK_LETTERS))):
+        axes.text(HOST - 5.0, y - 7.0 - k * STEP, words, ha="right", va="center", color=MUTED)
     axes.text(HOST - 5.0, y + 7.0, f"{offset} of UTC" if vehicle.offset_s is not None else
               "taken as in step with UTC", ha="right", va="center", color=MUTED)  # fmt: skip
     bound = numbers.MISSING if vehicle.offset_s is None else numbers.time(vehicle.offset_s)

@@ -126,7 +126,7 @@ def _says(
     brief: Brief, several: list[tuple[int, Factor]], limit: numbers.Limited | None
 ) -> list[tuple[str, str]]:
     """A case in words: number, setting, answer, price, error, payload."""
-    setting = [(factor.key, brief.labels[i]) for i, factor in several]
+    setting = [(factor.key, shown_value(factor, brief.labels[i])) for i, factor in several]
     found = [("Case", str(brief.number)), *setting, ("Verdict", brief.verdict)]
     if brief.cost is not None:
         found.append(("Price", numbers.money(brief.cost, brief.currency)))
@@ -249,8 +249,19 @@ def _case_table(summary: StudySummary) -> Table:
 def _setting_cells(brief: Brief, several: list[tuple[int, Factor]]) -> list[Cell]:
     """What varies: a cell per key, or one cell that names them all."""
     if len(several) <= MOST_KEYS:
-        return [Cell(brief.labels[i], _figure(brief, i)) for i, _ in several]
-    return [Cell("; ".join(f"{f.key} = {brief.labels[i]}" for i, f in several))]
+        return [Cell(shown_value(f, brief.labels[i]), _figure(brief, i)) for i, f in several]
+    return [Cell("; ".join(f"{f.key} = {shown_value(f, brief.labels[i])}" for i, f in several))]
+
+
+def shown_value(factor: Factor, label: str) -> str:
+    """A value as it was listed; one that was drawn to four figures, in full in CSV and JSON.
+
+    Shares and amounts of money stay as they are.
+    """
+    found = figure_of(plain_scalar(label)) if factor.origin == "sample" else None
+    if found is None or found[1].isupper() or "%" in label:
+        return label
+    return numbers.like(label, found[0])
 
 
 def _provenance(result: StudyResult) -> list[tuple[str, str]]:
