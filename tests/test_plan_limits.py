@@ -154,3 +154,12 @@ def test_scales_and_rates_are_read_in_ppm(effect: str, tmp_path: Path) -> None:
     done = call(path, "--reach", f"{effect}=900 ppm", "--minutes", 4, "-o", "json:-")
     (asked,) = json.loads(done.stdout)["tolerance"].values()
     assert asked == pytest.approx(9e-4)
+
+
+def test_a_pair_that_only_takes_longer_is_not_said_to_hang_on_its_size(tmp_path: Path) -> None:
+    pair = ("latency(position)", "lever_arm(position)")
+    done = call(spec_with(tmp_path), "--separate", *pair, "--minutes", 0.3, "-o", "markdown:-")
+    assert done.exit_code == 1
+    words = " ".join(done.stdout.split())
+    assert "Not reachable in 0.3 min" in words
+    assert "only where it is larger" not in words

@@ -75,7 +75,7 @@ def _outcome(found: Plan) -> Outcome:
     if found.reached:
         rest = ", but for what no drive tells" if found.inseparable else ""
         return Outcome("good", "\u2713", f"Reached by {legs} in {length}{rest}")
-    if _larger(found) is not None:
+    if found.least_minutes is None and _larger(found) is not None:
         return Outcome("bad", "\u2717", "Told apart only where it is larger")
     if found.least_minutes is None:
         return Outcome("bad", "\u2717", "Not reachable: no drive of this platform tells it")
