@@ -103,5 +103,11 @@ def test_rows_become_records_where_those_take_fewer_lines() -> None:
     assert len(list(fitted(shown, 200))) == 4
 
 
+def test_a_record_that_a_bare_number_heads_says_of_what() -> None:
+    shown = table("T", ("Case #", "Unbreakable-heading"), [("12", "yes"), ("x1", "no")])
+    lines = list(fitted(shown, 20))
+    assert [line for line in lines if not line.startswith(" ")] == ["Case 12", "x1"]
+
+
 def test_a_word_longer_than_the_line_is_not_broken() -> None:
     assert folded("see /a/very/long/path.yaml now", 10) == ["see", "/a/very/long/path.yaml", "now"]

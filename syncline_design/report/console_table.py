@@ -110,12 +110,14 @@ def _row(
 def _records(heads: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> Iterator[str]:
     """Each row as a record: its name, then a line for every other cell that says something.
 
+    A bare number is no name without its head.
     A corner that names both sides of a table is kept: nothing else says what its figures are.
     """
     if CORNER in heads[0]:
         yield from folded(heads[0], room, indent=GAP)
     for row in rows:
-        yield from folded(row[0] or "-", room, indent=GAP)
+        name = f"{heads[0]} {row[0]}" if row[0].isdecimal() else row[0]
+        yield from folded(name or "-", room, indent=GAP)
         for head, text in zip(heads[1:], row[1:], strict=True):
             if text:
                 yield from folded(f"{head}: {text}", room, GAP, GAP * 2)
