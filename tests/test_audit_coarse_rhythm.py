@@ -166,3 +166,14 @@ def test_messages_that_come_twice_where_no_two_share_a_tick(kind: str, rate: flo
     assert set(named(one)) == {kind, "duplicates"}
     assert named(one)["duplicates"].parameters["count"] == 15.0
     assert one.residual.bound == pytest.approx(np.ptp(receive - when), rel=0.1)
+
+
+@pytest.mark.parametrize("apart_s", [2e-9, 2e-6])
+def test_packets_of_pairs_whose_median_interval_is_of_neither_kind(apart_s: float) -> None:
+    """125 Hz in packets of 16 ms: as many intervals within pairs as between them, and the median
+    lies half-way."""
+    rng = generator(35)
+    heads = 0.016 * np.arange(4687.0) + rng.uniform(0.0, 2e-4, 4687)
+    stamp = np.stack([heads, heads + apart_s], axis=1).ravel()[:-1]
+    receive = np.maximum.accumulate(stamp + 1e-3 + rng.gamma(2.0, 5e-5, stamp.size))
+    assert set(named(of(stamp, receive))) == {"packetised"}

@@ -141,6 +141,8 @@ def _around(off: Array) -> Array:
 def _without_jumps_of_its_own(pace: Cadence) -> Cadence:
     """The rhythm with the mean interval of those alone that no jump lengthens."""
     single = pace.interval[pace.steps == 1.0]
+    if not single.size:
+        return pace  # packets of pairs: no interval is near the median one
     middle = float(np.median(single))
     near = single[np.abs(single - middle) <= _JITTER * scatter(single) + 1e-7]
     return replace(pace, period_s=float(near.mean()))
