@@ -49,6 +49,28 @@ def test_bursts_of_a_phase_of_their_own_are_how_messages_come(
     assert (one.pace.pauses.count, one.pace.pauses.anew) == (17, True)
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "messages", "every_s"), [(100.0, 12, 1.5), (1000.0, 3, 1.0), (50.0, 9, 2.0)]
+)
+@pytest.mark.parametrize("jitter_s", [0.0, 0.01])
+def test_short_bursts_are_no_packets(
+    rate_hz: float, messages: int, every_s: float, jitter_s: float
+) -> None:
+    """A packet hands over its messages at once; these are as far apart as they were measured."""
+    rng = np.random.default_rng(5)
+    begins = every_s * np.arange(100) + jitter_s * rng.standard_normal(100)
+    sound(*audited(bursts(begins, messages, rate_hz), rng))
+
+
+def test_bursts_of_any_number_are_no_packets() -> None:
+    rng = np.random.default_rng(6)
+    counts, begins = rng.integers(4, 15, 75), 2.0 * np.arange(75) + 0.1 * rng.standard_normal(75)
+    true = np.concatenate(
+        [begin + 0.02 * np.arange(count) for begin, count in zip(begins, counts, strict=True)]
+    )
+    sound(*audited(true, rng))
+
+
 @pytest.mark.parametrize("rate_hz", [10.0, 50.0])
 @pytest.mark.parametrize(("on_s", "off_s", "cycles"), [(2.0, 3.0, 18), (4.0, 2.0, 15), (10, 20, 4)])
 def test_a_duty_cycle_is_how_messages_come(

@@ -45,6 +45,8 @@ _MOST_LOST: Final = 0.15  # of all messages
 _COARSE_STEPS: Final = 3.0
 _OF_TWO: Final = 0.96  # of the intervals: one tick or two; among others messages may be lost
 _BUNCHED: Final = 0.25  # share of neighbours that come together
+_QUICK_READ_S, _SLOW_READ_S = 4e-4, 2e-3  # that a host takes to read a message of a packet
+_EVENLY: Final = 0.2  # of what they are apart
 _TOGETHER: Final = 0.1  # of the mean interval
 
 
@@ -262,7 +264,7 @@ def _bunches(
 ) -> Grain | None:
     heads = when[np.concatenate([[True], ~together])]
     apart = np.diff(heads)
-    if apart.size < 20:
+    if apart.size < 20 or _measured_apart(interval[together]):
         return None
     sizes = np.diff(np.flatnonzero(np.concatenate([[True], ~together])))
     size, often = np.unique(sizes, return_counts=True)
@@ -280,6 +282,17 @@ def _bunches(
     grid = middle if timer is None or other else timer
     sure = timer is not None and not other
     return _packets(series, interval, grid, sure, float(sizes.mean()), pace)
+
+
+def _measured_apart(within: Array) -> bool:
+    """Whether messages of a bunch are as far apart as a sensor measures that does so in bursts.
+
+    What a packet holds is handed over at once: reading it takes a message far less than a frame of
+    USB, and a time of its own each.
+    """
+    usual = float(np.median(within))
+    evenly = spread(within) < _EVENLY * usual
+    return usual > _SLOW_READ_S or (evenly and usual > _QUICK_READ_S)
 
 
 def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain | None:
