@@ -105,6 +105,37 @@ def test_what_comes_and_goes_or_leaves_more_than_noise_stays_a_word(
     assert "has no name" in rows_of(result)["ranging", "mounting"].evidence
 
 
+def test_a_step_of_stamps_is_measured_by_its_size_not_by_its_moment(found: Diagnosis) -> None:
+    """30 ms from 100 s on are 30 ms, not 100 s, in the row of the stamps' bound as well."""
+    step = stepping(found)
+    told = replace(found, findings=(step,), verdict="explained")
+    one = row_of("position", "timing")
+    row = by_log(one, LogEvidence(told, OnPaper(load(EXAMPLE), ()), one.stage))
+    assert row.status == "broken"
+    assert row.measured == MeasuredFigure(0.03, 0.029, 0.031)
+
+
+def test_a_delay_that_a_step_makes_has_the_room_of_a_word_for_a_drift(found: Diagnosis) -> None:
+    """Ranges that come ever later until they stay so: 30 ms by a step, the rest by a drift."""
+    told = replace(found, findings=(stepping(found), drifting(found)), verdict="unexplained")
+    one = row_of("position", "latency")
+    row = by_log(one, LogEvidence(told, OnPaper(load(EXAMPLE), ()), one.stage))
+    assert row.status == "broken"
+    assert row.measured is not None
+    assert row.measured.low == pytest.approx(0.029)
+    assert row.measured.high == pytest.approx(0.031 + 4e-4 * found.log.duration_s)
+
+
+def stepping(found: Diagnosis) -> Finding:
+    """Stamps that are ahead by 29 to 31 ms from 100 s on."""
+    part = found.findings[0].parameters["latency_s"]
+    step = replace(part, value=0.03, interval95=(0.029, 0.031))
+    moment = replace(part, value=100.0, interval95=None)
+    return replace(found.findings[0], effect="timestamp_step", sensor="position", also=None,
+                   parameters={"step_s": step, "time_s": moment}, kind="cause",
+                   material=True, aliases=())  # fmt: skip
+
+
 def drifting(found: Diagnosis) -> Finding:
     """What has no name, in the words of a clock that runs fast by 200 to 400 ppm."""
     part = found.findings[0].parameters["latency_s"]

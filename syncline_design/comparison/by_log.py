@@ -64,7 +64,7 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     moved = [each for each in shifts(one, log.found) if log.is_sure(one, each.finding)]
     shifted = by_shifts(one, moved, log.paper)
     if shifted is not None and shifted.status == "broken":
-        return shifted
+        return beside_shapes(one, shifted, log, signed=_is_signed(one))
     if suspect is not None:
         return suspect
     doubt = _doubt(one, log)

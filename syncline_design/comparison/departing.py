@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
@@ -84,16 +85,17 @@ def figure_of(one: Assumed, parameters: Mapping[str, Estimate]) -> MeasuredFigur
     """A departure's size with its interval; of several components, of their root sum of squares.
 
     None where the parameters are not in the assumption's unit, nor of noise its factor: degrees of
-    freedom are none.
+    freedom are none.  The moment of a step is no size.
     """
     if one.unit == "1":
         factor = parameters.get("factor")
         if factor is None:
             return None
         return MeasuredFigure(float(factor.value), *(factor.interval95 or (None, None)))
-    parts = [p for p in parameters.values() if _fits(p, one.unit)]
+    sizes = {name: p for name, p in parameters.items() if name not in _moments()}
+    parts = [p for p in sizes.values() if _fits(p, one.unit)]
     values = [float(p.value) for p in parts]
-    if not parts or len(parts) < len(parameters):
+    if not parts or len(parts) < len(sizes):
         return None
     if len(values) == 1:
         low, high = parts[0].interval95 or (None, None)
@@ -105,6 +107,12 @@ def figure_of(one: Assumed, parameters: Mapping[str, Estimate]) -> MeasuredFigur
     least = math.hypot(*(0.0 if a <= 0.0 <= b else min(abs(a), abs(b)) for a, b in spans))
     most = math.hypot(*(max(abs(a), abs(b)) for a, b in spans))
     return MeasuredFigure(math.hypot(*values), least, most)
+
+
+@cache
+def _moments() -> frozenset[str]:
+    """Parameters of effects that say when, not by how much."""
+    return frozenset(p.name for e in registry().values() for p in e.parameters if p.located)
 
 
 def _fits(part: Estimate, unit: str) -> bool:
