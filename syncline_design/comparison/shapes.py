@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from syncline_design.comparison.acceptance import AssumptionName
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.departing import of_finding
 from syncline_design.comparison.in_doubt import Suspicion, widened_by
@@ -14,7 +15,7 @@ from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.diagnosis.result import Diagnosis, Finding
 from syncline_design.effects import registry
 
-MOUNTED: Final = ("lever_arm", "mounting")  # what a knock changes
+MOUNTED: Final[tuple[AssumptionName, ...]] = ("lever_arm", "mounting")  # that a knock breaks
 
 
 def shapes(found: Diagnosis) -> tuple[Finding, ...]:
