@@ -38,14 +38,8 @@ from syncline_design.spec.load import load
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 ROOT = Path(__file__).parent.parent
-
-
 EXAMPLE = ROOT / "examples" / "hidden_latency.yaml"
-
-
 LATENCY_S = 0.087  # of the position data in the example's log
-
-
 ROWS = 1000
 
 

@@ -10,8 +10,6 @@ from syncline_design.cli.app import app
 from tests.clock_logs import sessions_csv
 
 ROOT = Path(__file__).parent.parent
-
-
 SPEC = """\
 syncline: 1
 name: two timelines

@@ -10,8 +10,6 @@ from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import Constant, TimingError, Uniform
 
 DEG = math.pi / 180.0
-
-
 # Typed in from the paper's tables (tab:examples, tab:sensor_accuracy): v m/s, omega deg/s, d m.
 # "auv" is the row its survey table was computed with, see docs/theory.md.
 PLATFORMS = {
@@ -23,8 +21,6 @@ PLATFORMS = {
     "small_sv": (4.0, 17.0, 1000.0),
     "auv": (2.0779, 8.7, 30.0),
 }
-
-
 SENSORS: dict[str, tuple[RoleName, tuple[float, float, float]]] = {  # m, deg
     "f9p_pvt": ("position", (1.5, 1.5, 1.5)),
     "f9p_rtk": ("position", (0.01, 0.01, 0.01)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 from typer.testing import CliRunner
@@ -14,14 +15,8 @@ from tests.world.planned import driven
 from tests.world.scenarios import Scenario
 
 DEGREE = math.pi / 180.0
-
-
 LIMITS = (9.0, 50.0 * DEGREE, 40.0)  # v_max, omega_max, distance
-
-
 STAMPED = "timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}"
-
-
 SPEC = f"""\
 syncline: 1
 name: copter
@@ -41,6 +36,17 @@ stages:
       lever_arm: [0.15 m, 0.05 m, 0.2 m]}}
 log: {{origin: [47.3 deg, 8.55 deg, 460 m]}}
 """
+
+
+def spec_with(folder: Path, *changes: tuple[str, str]) -> Path:
+    """The spec in a file of its own, each text in it exchanged for another."""
+    text = SPEC
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = folder / "copter.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 def world(run: PlanRun, seed: int = 5) -> Scenario:

@@ -30,8 +30,6 @@ stages:
     ranging: {sensor: {modality: ranging, sigma_range: 1 cm, sigma_bearing: 0.01 deg,
               primitives: []}, timestamping: {error: {distribution: constant, value: 0 s}}}
 """
-
-
 OWN_CLOCK = """\
 clocks:
   own: {name: own, offset: {distribution: uniform, low: -1 ms, high: 1 ms},

@@ -23,11 +23,7 @@ from tests.test_diagnose_log import NAMES, ROWS, columns, refusal, scanned, writ
 from tests.world.geodesy import to_geodetic
 
 ORIGIN_DEG = (47.3, 8.55, 460.0)
-
-
 ORIGIN = (np.radians(47.3), np.radians(8.55), 460.0)
-
-
 SHAPES: dict[str, Callable[[str], str]] = {
     "plain": lambda text: text,
     "crlf": lambda text: text.replace("\n", "\r\n"),

@@ -27,23 +27,11 @@ from tests.paper_systems import DEG, platform_of, sensor_of, survey
 # A slow obvious implementation at 50 digits, written from the paper alone.
 
 NOISE = st.floats(1e-4, 2.0)
-
-
 ANGLE = st.floats(1e-6, 0.05)
-
-
 SPEED = st.floats(0.01, 50.0)
-
-
 RATE = st.floats(0.001, 6.0)
-
-
 RANGE = st.floats(0.5, 2000.0)
-
-
 TAU = st.floats(0.0, 0.2)
-
-
 OFFSET = st.floats(0.0, 0.05)
 
 

@@ -27,8 +27,6 @@ GEOREFERENCING = [
         ("usv", "car", "multi_rotor", "fixed_wing"), row, strict=True
     )
 ]
-
-
 # tab:survey_tau, ms
 SURVEY = [
     (sensor, platform, figure)

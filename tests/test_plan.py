@@ -34,26 +34,20 @@ from syncline_design.planning.wanted import PlanWanted, reach_of
 from syncline_design.report.plans import render_plan
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
-from tests.planned_specs import LIMITS, SPEC, call, world
+from tests.planned_specs import LIMITS, SPEC, call, spec_with, world
 from tests.world.bound import cramer_rao
 from tests.world.hidden import hidden
 from tests.world.noise import Noise
 from tests.world.worldlog import make_log
 
 ORIGIN = (47.3, 8.55, 460.0)
-
-
 ACCELERATION = 2.0
-
-
 REACH = "latency(position)=1 ms, lever_arm(position)=1 cm"
 
 
 @pytest.fixture(scope="module")
 def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("plan") / "copter.yaml"
-    path.write_text(SPEC, encoding="utf-8")
-    return path
+    return spec_with(tmp_path_factory.mktemp("plan"))
 
 
 @pytest.fixture(scope="module")

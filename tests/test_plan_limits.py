@@ -22,20 +22,10 @@ from syncline_design.planning.vehicle import vehicles
 from syncline_design.planning.wanted import PlanWanted, separate_of
 from syncline_design.report.plans import render_plan
 from syncline_design.spec.load import load
-from tests.planned_specs import SPEC, call
+from tests.planned_specs import call, spec_with
 
 PAIR = ("heading_bias(attitude)", "boresight(ranging)")
 AREA_M = (150.0, 80.0)
-
-
-def spec_with(folder: Path, *changes: tuple[str, str]) -> Path:
-    text = SPEC
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    path = folder / "spec.yaml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 @pytest.fixture(scope="module")

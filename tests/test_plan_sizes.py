@@ -10,21 +10,17 @@ import pytest
 
 import syncline_design as sd
 from syncline_design.planning.telling import PlanRun
-from tests.planned_specs import SPEC, call, world
+from tests.planned_specs import call, spec_with, world
 from tests.world.hidden import hidden
 from tests.world.worldlog import make_log
 
 LARGE_S = 0.3
-
-
 LATENCY, LAG = "latency(position)", "filter_lag(position)"
 
 
 @pytest.fixture(scope="module")
 def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("plan") / "copter.yaml"
-    path.write_text(SPEC, encoding="utf-8")
-    return path
+    return spec_with(tmp_path_factory.mktemp("plan"))
 
 
 @pytest.fixture(scope="module")

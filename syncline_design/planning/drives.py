@@ -31,7 +31,7 @@ from syncline_design.planning.information import (
 )
 from syncline_design.planning.legs import Leg, library, transition
 from syncline_design.planning.path import STEP_S, CourseCommands, PathStates, joined, travelled
-from syncline_design.planning.placing import LegTold, Room, Swept, arranged
+from syncline_design.planning.placing import QUARTER_RAD, LegTold, Room, Swept, arranged
 from syncline_design.planning.planned_log import (
     Drive,
     apart,
@@ -43,7 +43,6 @@ from syncline_design.planning.planned_log import (
 from syncline_design.planning.vehicle import Vehicle
 
 COMPUTED_HZ = 10.0  # rows that are computed; more rows a second count as less noise each
-QUARTER = 0.5 * math.pi
 GAP_S = 1000.0  # between legs that are looked at as one log: no noise lasts so long
 Index = NDArray[np.int64]
 
@@ -88,7 +87,7 @@ class World:
     def turned_about(self, courses: Sequence[CourseCommands]) -> list[Drive]:
         """A drive of courses at all four headings."""
         whole = self.driven(courses)
-        every = [turned(whole, QUARTER * h) for h in range(4)]
+        every = [turned(whole, QUARTER_RAD * h) for h in range(4)]
         return every if self.surveyed is None else [self._beside(one.states) for one in every]
 
     def view(self, driven: Drive) -> Scene:
@@ -187,7 +186,9 @@ class World:
             if one.area_m is None
             else Room(
                 one.area_m,
-                tuple(_swept(travelled(one, transition(one, QUARTER * k))) for k in range(-2, 3)),
+                tuple(
+                    _swept(travelled(one, transition(one, QUARTER_RAD * k))) for k in range(-2, 3)
+                ),
             )
             for one in self.vehicles
         )
@@ -243,7 +244,7 @@ def whole_drive(
             for own, one in zip(parts, world.courses_of(leg.stage, course), strict=True):
                 own.append(one)
             steps += len(course)
-        found.append(DrivenLeg(leg, begun * STEP_S, steps * STEP_S, QUARTER * placed.heading))
+        found.append(DrivenLeg(leg, begun * STEP_S, steps * STEP_S, QUARTER_RAD * placed.heading))
     return tuple(found), [joined(own) for own in parts]
 
 

@@ -18,7 +18,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.legs import FULL_RAD, LINE_S, Leg
 from syncline_design.planning.path import STEP_S, CourseCommands
-from syncline_design.planning.placing import LegTold
+from syncline_design.planning.placing import QUARTER_RAD, LegTold
 from syncline_design.planning.search import PlanJudge
 from syncline_design.planning.vehicle import Vehicle
 
@@ -127,8 +127,8 @@ def line_plans(vehicle: Vehicle, told: Sequence[LegTold]) -> tuple[Lines, ...]:
 
 def _turns_s(own: Sequence[tuple[LegTold, int]], rate_radps: float) -> Array:
     """Time of the turn from the end of one leg to the heading of the next, around the round."""
-    ends = [0.5 * math.pi * heading + told.turned_rad for told, heading in own]
-    begins = [0.5 * math.pi * heading for _, heading in own]
+    ends = [QUARTER_RAD * heading + told.turned_rad for told, heading in own]
+    begins = [QUARTER_RAD * heading for _, heading in own]
     angles = [
         abs(math.remainder(begin - end, FULL_RAD))
         for begin, end in zip(begins, [ends[-1], *ends[:-1]], strict=True)
