@@ -212,11 +212,14 @@ def _since(time_s: Array, ends: Sequence[int]) -> Array:
 
 
 def held(vehicle: Vehicle, steps: int) -> CourseCommands:
-    """What a vehicle does while another one drives: hover, or wide circles, slowly."""
-    speed = np.full(steps, vehicle.wait_mps)
+    """What a vehicle does while another one drives: hover, or wide circles.
+
+    At the speed at which legs join: slower, it would have to brake at once where its leg ends.
+    """
+    speed = np.full(steps, vehicle.join_mps)
     zero = np.zeros(steps)
     return CourseCommands(
-        speed, zero, zero, np.full(steps, 0.5 * vehicle.turn_radps(vehicle.wait_mps))
+        speed, zero, zero, np.full(steps, 0.5 * vehicle.turn_radps(vehicle.join_mps))
     )
 
 

@@ -234,8 +234,8 @@ class Telling:
         """What the other vehicles of a chain do."""
         held = [
             f"{v.stage} hovers"
-            if v.wait_mps == 0.0
-            else f"{v.stage} circles wide at {to_digits(v.wait_mps, 2)} m/s"
+            if v.join_mps == 0.0
+            else f"{v.stage} circles wide at {to_digits(v.join_mps, 2)} m/s"
             for k, v in enumerate(self.setup.world.vehicles)
             if k != stage
         ]

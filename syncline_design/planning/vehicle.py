@@ -87,11 +87,6 @@ class Vehicle:
         return max(SHARE * self.v_max_mps, self.slowest_mps)
 
     @property
-    def wait_mps(self) -> float:
-        """The speed at which it waits while another vehicle drives."""
-        return 0.0 if self.hovers else max(self.slowest_mps, self.fast_mps / 3.0)
-
-    @property
     def join_mps(self) -> float:
         """The speed at which one leg ends and the next begins: where it turns fastest.
 
@@ -100,7 +95,7 @@ class Vehicle:
         if self.hovers:
             return 0.0
         quickest = math.sqrt(ACROSS * self.acceleration_mps2 * self.turn_radius_m)
-        return min(max(self.wait_mps, quickest), self.fast_mps)
+        return min(max(self.slowest_mps, self.fast_mps / 3.0, quickest), self.fast_mps)
 
     def turn_radps(self, speed_mps: float) -> float:
         """Largest turn rate at a speed: omega_max, a lateral acceleration, a radius."""
@@ -130,7 +125,8 @@ def _vehicle(case: Case, stage: StageCase, ranging_type: str) -> Vehicle:
                        "reverses; `motion:` of the platform says more)")  # fmt: skip
     accelerates = _stated(entry.acceleration, _usual_acceleration(usual, v_max))
     if entry.acceleration is None:
-        assumed.append(f"acceleration: {to_digits(accelerates, 3)} m/s^2")
+        waves = ", on the level: the waves' heave adds to it" if motion == "surface" else ""
+        assumed.append(f"acceleration: {to_digits(accelerates, 3)} m/s^2{waves}")
     radius = usual.turn_radius_m if usual.turn_radius_m is not None else v_max / omega
     if entry.minimum_turn_radius is None and radius > 0.0:
         assumed.append(f"minimum_turn_radius: {to_digits(radius, 3)} m")
