@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import gc
+import importlib
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from once import SHARED
 
 # Matrices are small and many: two threads of the linear algebra library cost more than they do, and
 # the command sets the same.  Before numpy is imported; that threads change no digit is a test of
@@ -26,6 +31,11 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
     _bytecode = tempfile.mkdtemp(prefix="bytecode-")
     os.environ["PYTHONPYCACHEPREFIX"] = _bytecode
     atexit.register(shutil.rmtree, _bytecode, ignore_errors=True)
+
+# What the processes of a run make once for all of them (once.py): the first to start sets it.
+if SHARED not in os.environ:
+    os.environ[SHARED] = tempfile.mkdtemp(prefix="shared-")
+    atexit.register(shutil.rmtree, os.environ[SHARED], ignore_errors=True)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -46,6 +56,24 @@ def browser() -> Iterator[object]:
     from browsing import launched
 
     yield from launched()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Workers that collect the whole suite begin at different files, and find the rest compiled.
+
+    Each imports every file of tests; in one order they would all compile the same one at a time.
+    """
+    given: dict[str, str] = getattr(session.config, "workerinput", {})
+    count, here = int(given.get("workercount", 1)), Path(__file__).parent
+    if count == 1 or [Path(one).resolve() for one in session.config.args] != [here]:
+        return
+    files = sorted(here.glob("test_*.py"))
+    first = len(files) * int(given["workerid"].removeprefix("gw")) // count
+    sys.path.insert(0, str(here))  # as pytest does before it imports the first
+    for file in (*files[first:], *files[:first]):
+        with contextlib.suppress(Exception, pytest.skip.Exception):  # collecting it says why
+            importlib.import_module(file.stem)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

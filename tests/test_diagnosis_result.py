@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,6 +10,7 @@ import jsonschema
 import pytest
 
 from html_page import Page
+from once import once
 from syncline_design.comparison.meaning import DiagnosisAndDesign, meaning, with_design
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.machine.records import read_as
@@ -36,7 +36,7 @@ def of(log: WorldLog, *exclude: str) -> DiagnosisAndDesign:
     return with_design(found, means)
 
 
-@cache
+@once
 def example() -> DiagnosisAndDesign:
     """The shipped example, the first minute and a half of it."""
     spec = EXAMPLES / "hidden_latency.yaml"
@@ -50,17 +50,17 @@ def example() -> DiagnosisAndDesign:
     return with_design(found, means)
 
 
-@cache
+@once
 def clean() -> DiagnosisAndDesign:
     return of(make_log(scenario("multirotor_lines", 7, 60.0, 5.0), ()))
 
 
-@cache
+@once
 def unexplained() -> DiagnosisAndDesign:
     return of(make_log(scenario("multirotor_lines", 12, 80.0, 5.0), (IRON,)), "heading_hard_iron")
 
 
-@cache
+@once
 def turned() -> DiagnosisAndDesign:
     return of(make_log(scenario("car_stops", 31, 60.0, 5.0), (TURNED,)))
 
