@@ -50,15 +50,83 @@ def test_arrivals_at_the_ends_of_usb_frames(
     assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.1)
 
 
-def test_frames_that_a_whole_interval_hides_are_said_and_counted(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("rate", "tick"),
+    [(200.0, 1e-3), (100.0, 2e-3), (50.0, 4e-3), (125.0, 8e-3), (25.0, 8e-3), (62.5, 16e-3)],
+)
+def test_ticks_that_a_whole_interval_hides_are_said_and_counted(
+    tmp_path: Path, rate: float, tick: float
+) -> None:
+    """Read by a host that is late by an interrupt: no tick's edge lies within the log, and the
+    longest tick that a whole number of makes the interval may have held messages back."""
     rng = np.random.default_rng(32)
-    t = 0.0171 + np.arange(3000) / 50.0
-    stamp = t + 3e-4 + rng.exponential(3e-5, t.size)  # no frame's edge within the log
+    t = 0.0171 + np.arange(3000) / rate
+    stamp = t + 3e-4 + rng.exponential(3e-5, t.size)
     receive = recorded(stamp, rng)
     row = said(tmp_path, stamp, receive)
     assert not found(row)
-    assert hides(row, "frames of 1 ms")
-    assert row.residual_s.bound == pytest.approx(np.ptp(receive - stamp) + FRAME, abs=1e-6)
+    assert hides(row, f"{1e3 * tick:.0f} ms")
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - stamp) + tick, abs=1e-6)
+
+
+@pytest.mark.parametrize("rate", [47.3, 20.2, 30.1])
+def test_intervals_near_whole_frames_hide_none(tmp_path: Path, rate: float) -> None:
+    """A tenth of a frame off: over frames they would be a frame more and less apart."""
+    rng = np.random.default_rng(39)
+    t = even(rate, 60.0)
+    stamp = t + 3e-4 + rng.exponential(3e-5, t.size)
+    receive = recorded(stamp, rng)
+    row = said(tmp_path, stamp, receive)
+    assert not found(row)
+    assert not hides(row, "frames")
+    assert not hides(row, "ticks")
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - stamp), abs=1e-6)
+
+
+# timer, rates whose interval is no whole number of its ticks, a threads' delay
+SERIAL = [
+    (8e-3, 20.0, 0.0), (8e-3, 47.3, 1e-3), (8e-3, 50.0, 1e-3), (8e-3, 100.0, 0.0),
+    (8e-3, 100.0, 1e-3), (8e-3, 115.2, 1e-3), (16e-3, 25.0, 1e-3), (16e-3, 50.0, 0.0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("timer", "rate", "threads"), SERIAL)
+def test_ticks_of_a_serial_chip_are_named_at_any_rate(
+    tmp_path: Path, timer: float, rate: float, threads: float
+) -> None:
+    rng = np.random.default_rng(40)
+    t = even(rate * (1 + 2e-5), 75.0)
+    stamp = np.ceil((t - 3.1e-3) / timer) * timer + 3.1e-3 + 1e-4 + rng.gamma(2.0, 2e-5, t.size)
+    receive = recorded(stamp, rng) + rng.uniform(0.0, threads, t.size)
+    row = said(tmp_path, stamp, receive)
+    assert set(found(row)) == {"packetised"}
+    assert found(row)["packetised"].parameters["interval_s"] == timer
+    bound = row.residual_s.bound
+    assert bound is not None
+    # of few places in a tick it is not seen how far the sensor's clock moved between them
+    assert 0.97 * np.ptp(receive - t) < bound < np.ptp(receive - t) + 5e-5 * 75.0
+    assert bound < timer + 1.1 * np.ptp(receive - stamp)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1])
+def test_lost_messages_of_a_sensor_that_a_host_stamps_are_no_ticks(
+    tmp_path: Path, share: float
+) -> None:
+    """125 Hz is a tick of 8 ms: what is missing at random follows no line."""
+    rng = np.random.default_rng(41)
+    t = even(125.0, 75.0)
+    t = t[rng.random(t.size) > share]
+    stamp = t + 3e-4 + rng.exponential(3e-5, t.size)
+    row = said(tmp_path, stamp, recorded(stamp, rng))
+    assert set(found(row)) == {"lost_messages"}
+
+
+def test_publishers_in_turn_that_a_host_stamps_are_no_ticks(tmp_path: Path) -> None:
+    """8.2 and 11.8 ms apart by turns, a fifth of a millisecond off ticks of 4 ms."""
+    rng = np.random.default_rng(42)
+    t = 0.02 * np.repeat(np.arange(2000.0), 2) + np.tile([0.0, 0.0082], 2000)
+    stamp = t + 3e-4 + rng.exponential(3e-5, t.size)
+    assert "packetised" not in found(said(tmp_path, stamp, recorded(stamp, rng)))
 
 
 @pytest.mark.parametrize("ticks", [1e-3, 1.25e-4])

@@ -27,8 +27,9 @@ def named(one: Examined) -> list[str]:
 
 
 def in_packets(rate_hz: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """(moments measured, moments stamped) of 60 s behind a chip that hands on every 16 ms."""
-    true = 3e-4 + np.arange(int(min(60.0 * rate_hz, 20_000))) / rate_hz
+    """(moments measured, moments stamped) of 60 s behind a chip that hands on every 16 ms; the
+    sensor's clock moves by 1.2 ms against the chip's."""
+    true = 3e-4 + np.arange(int(min(60.0 * rate_hz, 20_000))) / rate_hz * (1.0 + 2e-5)
     handed = np.ceil((true + 4.3e-3) / 0.016) * 0.016
     return true, handed + 1e-4 + rng.gamma(2.0, 5e-5, true.size)
 

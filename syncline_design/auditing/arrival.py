@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.auditing.cadence import Cadence, about_rhythm, without_losses
-from syncline_design.auditing.frames import Framed, framed
+from syncline_design.auditing.frames import FULL_SPEED_S, Framed, framed
 from syncline_design.auditing.late_scatter import Waits, waits_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Mask, Series, in_words, seconds, spread
@@ -113,7 +113,7 @@ def hidden_in(series: Series, pace: Cadence) -> Hidden | None:
     transport = _width(seconds((series.receive - series.stamp)[pace.places]))
     found = framed(when)
     if found is not None:
-        return _hidden_frame(found, transport)
+        return _hidden_frame(found)
     waits = waits_of(without_losses(when, pace))
     if waits is None or not waits.edged:
         return None
@@ -126,16 +126,17 @@ def hidden_in(series: Series, pace: Cadence) -> Hidden | None:
                   "that is triggered so")  # fmt: skip
 
 
-def _hidden_frame(found: Framed, transport_s: float) -> Hidden | None:
+def _hidden_frame(found: Framed) -> Hidden:
     frame = in_words(found.frame_s)
-    if found.varied:
-        why = "by turns a frame more and less apart, as arrivals do and ticks of its own task"
-    elif transport_s < _TIGHT * found.frame_s:
-        why = "its interval is a whole number of them"
-    else:
-        return None
+    late = f"{in_words(found.noise_s)} late"
+    if found.frame_s > FULL_SPEED_S and not found.varied:
+        return Hidden(found.frame_s, "whether it was stamped on arrival through a serial chip: "
+                      f"its stamps lie on ticks of {frame}, {late}, as its interval is a whole "
+                      "number of these, and of shorter ones that they hold")  # fmt: skip
+    why = ("by turns a frame more and less apart, as arrivals do and ticks of its own task"
+           if found.varied else "its interval is a whole number of them")  # fmt: skip
     return Hidden(found.frame_s, f"whether it was stamped on arrival over USB: its stamps lie on "
-                  f"frames of {frame}, {in_words(found.noise_s)} late, {why}")  # fmt: skip
+                  f"frames of {frame}, {late}, {why}")  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)

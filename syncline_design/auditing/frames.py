@@ -17,14 +17,17 @@ from syncline_design.auditing.series import Array, Mask, spread
 from syncline_design.machine.quick_dataclass import dataclass
 
 FRAMES_S: Final = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
+TICKS_S: Final = (0.016, 0.008, 0.004)  # of the timers of serial chips, which hold back for longer
 FULL_SPEED_S: Final = 1e-3
 LEAST_NOISE_S: Final = 5e-6  # of an interrupt; what is evener are ticks that a sensor keeps
 _NEAR: Final = 0.2  # of a frame: how far from the comb intervals are
 _MOST_OFF: Final = 0.05  # of all intervals
 _LEAST_VARIED, _SHARE = 3, 0.002  # of intervals that differ from the usual one
+_ALL: Final = 0.95
 _LONGEST: Final = 1.5  # of an interval: a frame holds hardly more than one message
 _STRETCH: Final = 24  # messages over which a comb stands still
 _SKEWED: Final = 0.2
+_CLOCKS: Final = 3e-4  # of an interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,40 +44,58 @@ class Framed:
 
 
 def framed(when: Array) -> Framed | None:
-    """The frames that stamps [s] lie on, the longest that fit."""
+    """The frames, or ticks of a timer, that stamps [s] lie on, the longest that fit."""
     if when.size < 4 * _STRETCH:
         return None
     passed = np.diff(when)
     usual = float(np.median(passed))
-    whole: Framed | None = None
     for frame in FRAMES_S:
-        if frame > _LONGEST * usual:
+        if frame > _LONGEST * usual or not on_comb(passed, frame):
             continue
-        counts = np.round(passed / frame)
-        off = np.abs(passed - frame * counts) > _NEAR * frame
-        if float(np.mean(off)) > _MOST_OFF:
-            continue
-        noise = _late_by(when, counts, frame)
-        if noise is None:
-            continue
-        if _varies(counts, off):
+        noise = late_by(when, frame)
+        if noise is not None and _varies(passed, frame):
             return Framed(frame, noise, True)
-        whole = Framed(frame, noise, False) if frame == FULL_SPEED_S else whole
-    return whole
+    for frame in (*TICKS_S, *(f for f in FRAMES_S if f >= FULL_SPEED_S)):
+        if frame > _LONGEST * usual or not (on_comb(passed, frame) and _whole(when, frame)):
+            continue
+        noise = late_by(when, frame)
+        if noise is not None:
+            return Framed(frame, noise, False)
+    return None
 
 
-def _varies(counts: Array, off: Mask) -> bool:
+def on_comb(passed: Array, frame: float) -> bool:
+    """Whether intervals [s] are whole numbers of frames."""
+    return float(np.mean(_off(passed, frame))) <= _MOST_OFF
+
+
+def _whole(when: Array, frame: float) -> bool:
+    """Whether the usual interval is a whole number of frames, but for what two clocks differ by."""
+    usual = float(np.median(when[_STRETCH:] - when[:-_STRETCH])) / _STRETCH
+    return abs(usual - frame * round(usual / frame)) < _CLOCKS * usual
+
+
+def _off(passed: Array, frame: float) -> Mask:
+    return np.asarray(np.abs(passed - frame * np.round(passed / frame)) > _NEAR * frame)
+
+
+def _varies(passed: Array, frame: float) -> bool:
     """Whether intervals next to the usual one are there, on the comb as well; those of lost
-    messages do not count."""
+    messages do not count, nor those of longer ticks."""
+    counts = np.round(passed / frame)
     values, often = np.unique(counts, return_counts=True)
     usual = float(values[int(np.argmax(often))])
     beside = (counts != usual) & (np.abs(counts - usual) <= max(1.0, 0.5 * usual))
     enough = int(beside.sum()) >= max(_LEAST_VARIED, _SHARE * counts.size)
-    return enough and float(np.mean(off[beside])) < 2.0 * _MOST_OFF
+    if not enough or float(np.mean(_off(passed, frame)[beside])) >= 2.0 * _MOST_OFF:
+        return False
+    longer = [round(tick / frame) for tick in TICKS_S if usual % round(tick / frame) == 0]
+    return not any(float(np.mean(counts[beside] % ticks == 0.0)) > _ALL for ticks in longer)
 
 
-def _late_by(when: Array, counts: Array, frame: float) -> float | None:
+def late_by(when: Array, frame: float) -> float | None:
     """Scatter about the comb [s] where it is late rather than early, as an interrupt is."""
+    counts = np.round(np.diff(when) / frame)
     x = when - frame * np.concatenate([[0.0], np.cumsum(counts)])
     pieces = x[: x.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
     k = np.arange(_STRETCH) - 0.5 * (_STRETCH - 1)

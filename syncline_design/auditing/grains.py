@@ -10,6 +10,7 @@ from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.coarse_rhythm import evenly
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
+from syncline_design.auditing.ticks import tick_of
 from syncline_design.logs.readers.stream import Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
@@ -256,7 +257,9 @@ def _packetised(series: Series, pace: Cadence, stamp: np.ndarray) -> Grain | Non
     bunched = float(np.mean(together))
     if bunched >= _BUNCHED:
         return _bunches(series, when, interval, together, pace)
-    return _timer(series, when, interval, pace)
+    found = _timer(series, when, interval, pace)
+    tick = tick_of(series, pace.places) if found is None else None
+    return found if tick is None else _packets(series, interval, tick, True, 1.0, pace)
 
 
 def _bunches(

@@ -9,12 +9,16 @@ import numpy as np
 from syncline_design.auditing.cadence import Cadence, cadence, counted_over_gaps
 from syncline_design.auditing.coarse_rhythm import counted_behind
 from syncline_design.auditing.envelope import above_floor
+from syncline_design.auditing.frames import FULL_SPEED_S, TICKS_S
 from syncline_design.auditing.late_scatter import waits_of
 from syncline_design.auditing.result import FaultName, ResidualTime, StampFault
 from syncline_design.auditing.series import Array, Series, seconds, spread
+from syncline_design.machine.quick_dataclass import dataclass
 
 LATE_OR_COARSE: Final = frozenset({"packetised", "truncated_stamps", "stamped_on_arrival"})
 _FLOOR: Final = 48  # messages, of which the fastest hardly waits
+_SAME: Final = 1e-3  # of a tick
+_CLOCKS: Final = 5e-5  # that a sensor's clock and the host's differ by; crystals: 10 to 50 ppm
 _WHOLE_TICK: Final = 2.5  # ticks: more is no count of what was measured
 
 
@@ -27,14 +31,24 @@ def residual_of(raw: Series, series: Series, faults: tuple[StampFault, ...]) -> 
     restored = _restored(series, whole)
     if restored is None:
         return ResidualTime(None, None, None)
-    left = above_floor(series.seconds[series.places()], restored, sloping=drifts)
+    left = above_floor(series.seconds[series.places()], restored.late, sloping=drifts)
+    left += restored.unseen_s
     bound = float(left.max())
     recorded = max(bound, float(np.ptp(_recorded(raw, series))))
     return ResidualTime(bound, float(np.percentile(left, 95.0)), recorded)
 
 
-def _restored(series: Series, faults: tuple[StampFault, ...]) -> Array | None:
-    """Receipt minus stamp [s], stamps of a coarse or late clock put back to their sensor's rhythm.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Restored:
+    """Receipt minus stamp [s] of stamps put back to their sensor's rhythm; unseen_s: by how much
+    more some may have waited for a tick."""
+
+    late: Array
+    unseen_s: float = 0.0
+
+
+def _restored(series: Series, faults: tuple[StampFault, ...]) -> _Restored | None:
+    """Receipt minus stamp, stamps of a coarse or late clock put back to their sensor's rhythm.
 
     None where stamps are arrivals and no rhythm says of what: how late they are is not known.
     """
@@ -44,15 +58,28 @@ def _restored(series: Series, faults: tuple[StampFault, ...]) -> Array | None:
     late = seconds(whole - whole.min())
     names = {f.fault for f in faults}
     if not names & LATE_OR_COARSE:
-        return late
+        return _Restored(late)
     when = seconds(series.stamp[places] - series.stamp[places[0]])
     tick_s = _tick_of(faults)
     rhythm = _of_coarse(series, when, tick_s, names) if tick_s > 0.0 else None
     if rhythm is None:
         rhythm = _rhythm(when, cadence(series), tick_s)
     if rhythm is not None:
-        return np.asarray(late + when - rhythm)
-    return None if names & {"packetised", "stamped_on_arrival"} else late
+        unseen_s = _unseen(when - rhythm, when, tick_s) if "packetised" in names else 0.0
+        return _Restored(np.asarray(late + when - rhythm), unseen_s)
+    return None if names & {"packetised", "stamped_on_arrival"} else _Restored(late)
+
+
+def _unseen(waits: Array, when: Array, tick_s: float) -> float:
+    """By how much waits for a chip's timer may differ more than they seem to [s].
+
+    Where a sensor's interval is a simple part or multiple of the tick its messages come at a few
+    places of it, and the sensor's clock may move within what lies between them without a trace.
+    Packets of another length are of whole numbers of messages, which no clock moves.
+    """
+    if min(abs(tick_s / timer - 1.0) for timer in (*TICKS_S, FULL_SPEED_S)) > _SAME:
+        return 0.0
+    return min(max(0.0, tick_s - float(np.ptp(waits))), _CLOCKS * float(when[-1]))
 
 
 def _tick_of(faults: tuple[StampFault, ...]) -> float:
