@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
-from syncline_design.diagnosis.loud_readings import ReadingsNoise, fitted, loud_readings
+from syncline_design.diagnosis.loud_readings import ReadingsNoise, _swept, fitted, loud_readings
 from syncline_design.diagnosis.noise_split import factors
 from syncline_design.diagnosis.unlike_readings import unlike_readings
 from tests.test_accept_stretches import settled, world
@@ -73,6 +73,21 @@ def test_sensors_as_specified_or_loud_as_a_whole_have_no_unlike_readings(times: 
     own = slopes(ROWS, 5)
     error = drawn(own, {RANGING: np.full(3, times)}, 6)
     assert loud_readings(error, own, np.broadcast_to(FIXED, (ROWS, 3, 3))) == ()
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_blocks_of_unlike_sizes_are_inverted_as_by_a_library(size: int) -> None:
+    """Axes of a millimetre beside those of a kilometre: what they have in common is what counts."""
+    rng = np.random.default_rng(11)
+    turned = np.linalg.qr(rng.standard_normal((200, size, size)))[0]
+    alike = (turned * rng.uniform(0.1, 1.0, (200, 1, size))) @ np.swapaxes(turned, 1, 2)
+    scale = 10.0 ** rng.uniform(-3.0, 3.0, (200, size, 1))
+    blocks = scale * alike * np.swapaxes(scale, 1, 2)
+    inverse, logs = _swept(np.ascontiguousarray(np.moveaxis(blocks, 0, 2)))
+    found = scale * np.moveaxis(inverse, 2, 0) * np.swapaxes(scale, 1, 2)
+    assert found == pytest.approx(np.linalg.inv(alike), abs=1e-11)
+    sizes = np.linalg.slogdet(alike)[1] + 2.0 * np.sum(np.log(scale), axis=(1, 2))
+    assert logs == pytest.approx(sizes, abs=1e-11)
 
 
 def test_the_fit_is_the_one_of_largest_likelihood() -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from syncline_design.diagnosis import search
 from syncline_design.diagnosis.candidates import Candidate, Signature
+from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.instead import InQuestion, others_in_place
-from syncline_design.diagnosis.noise import as_specified
+from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.pairs import promising
 from syncline_design.diagnosis.scores import Gram, gram
 from syncline_design.effects import registry
@@ -101,3 +104,22 @@ def test_a_delay_and_the_arm_that_hides_it_show_together(tmp_path: Path) -> None
     best, *_ = promising([(level, gram(data, model, free, level))], free, -5.0)
     kinds = {s.candidate.effect.breaks for s in best.pair}
     assert kinds == {"latency", "lever_arm"}
+
+
+def test_one_look_scores_each_noise_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Effects alone and two by two are looked for in the same scores, half of the work of a look."""
+    log = make_log(world("car_stops", 4, 60.0, 4.0))
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(log.spec_yaml(), "utf-8")
+    data, model, free = settled(spec, log.to_csv(tmp_path / "log.csv"))
+    looked = search.start_search(data, search.DiagnosisSettings(), lambda _: None)
+    scores = gram(data, model, free, model.level)
+    scored: list[NoiseLevel] = []
+
+    def counted(data: Data, model: Model, of: Sequence[Signature], level: NoiseLevel) -> Gram:
+        scored.append(level)
+        return gram(data, model, of, level)
+
+    monkeypatch.setattr(search, "gram", counted)
+    assert looked.moving(model, scores, looked.threshold(scores)) is None
+    assert len(scored) == len(set(scored)) == 1

@@ -72,6 +72,7 @@ EPISODES = 7  # key of the draws that look for them
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
 Label = tuple[str, str, int]
+Rung = tuple[NoiseLevel, Gram]  # a noise model to screen under, and the scores under it
 SearchProgress = Callable[[str, float], None]  # (what is being done, share done 0..1)
 
 
@@ -231,11 +232,12 @@ class Search:
         Effects that act in all of the log go first, then those in a part of it, then waves without
         a name; noise comes after all of them.
         """
-        moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
+        rungs = self.rungs(model, scores)
+        moving = [self.trial(model, s, level) for s, level in self.screened(model, rungs)]
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
         best = preferred(kept) or self.swallowed(model, scores, threshold)
         if best is None:
-            both = [self.part_trial(model), self.pair_trial(model, scores, threshold)]
+            both = [self.part_trial(model), self.pair_trial(model, rungs, threshold)]
             found = min([t for t in both if t], key=lambda t: t.log_p, default=None)
             return found or self.wave_trial(model)
         return self.not_for_good(model, best)
@@ -297,13 +299,20 @@ class Search:
         """log p that one of so many candidates falls below at the stated rate, at most."""
         return math.log(MEAN_SHARE * self.settings.false_alarm_rate / max(candidates, 1))
 
-    def screened(self, model: Model, scores: Gram) -> list[tuple[Signature, NoiseLevel]]:
+    def rungs(self, model: Model, scores: Gram) -> list[Rung]:
+        """Scores of what the model does not hold under every noise of the ladder."""
+        free = self.free_signatures(model)
+        return [
+            (level, scores if level is model.level else gram(self.data, model, free, level))
+            for level in ladder(self.data, model)
+        ]
+
+    def screened(self, model: Model, rungs: Sequence[Rung]) -> list[tuple[Signature, NoiseLevel]]:
         """Signatures that gain most under any noise of the ladder, one per candidate."""
         free = self.free_signatures(model)
         standing = self.standing(model, free)
         best: dict[tuple[str, str, int], tuple[float, Signature, NoiseLevel]] = {}
-        for level in ladder(self.data, model):
-            seen = scores if level is model.level else gram(self.data, model, free, level)
+        for level, seen in rungs:
             for s, (gain, values) in zip(free, seen.gains(), strict=True):
                 if s.candidate.label not in standing or not possible(s, values):
                     continue
@@ -336,14 +345,9 @@ class Search:
         kept = [t for t in trials if t.gain > WANDER_NATS and plausible(self.data, t.model)]
         return preferred(kept)
 
-    def pair_trial(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
+    def pair_trial(self, model: Model, rungs: Sequence[Rung], threshold: float) -> Trial | None:
         """The model with two effects more, neither of which shows without the other."""
-        free = self.free_signatures(model)
-        seen = [
-            (level, scores if level is model.level else gram(self.data, model, free, level))
-            for level in ladder(self.data, model)
-        ]
-        found = promising(seen, free, threshold)[:PAIRS]
+        found = promising(rungs, self.free_signatures(model), threshold)[:PAIRS]
         limit = self.chance(len({s.candidate.label for s in self.signatures}))
         trials = []
         for one in standing(self.states, model, found, limit)[:TRIED_PAIRS]:
@@ -399,7 +403,7 @@ class Search:
             rest = tuple(a for i, a in enumerate(model.acting) if i != k)
             without = fit(self.data, rest, model.opened, start=model.level)
             scores = gram(self.data, without, self.free_signatures(without), without.level)
-            for s, level in self.screened(without, scores):
+            for s, level in self.screened(without, self.rungs(without, scores)):
                 if s.candidate.label == one:
                     break  # what gains less to first order is no better
                 if s.candidate.effect.kind == "stochastic":
