@@ -107,7 +107,7 @@ def test_a_delay_and_the_arm_that_hides_it_show_together(tmp_path: Path) -> None
 
 
 def test_one_look_scores_each_noise_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Effects alone and two by two are looked for in the same scores, half of the work of a look."""
+    """Effects alone and two by two are looked for in the same scores."""
     log = make_log(world("car_stops", 4, 60.0, 4.0))
     spec = tmp_path / "spec.yaml"
     spec.write_text(log.spec_yaml(), "utf-8")

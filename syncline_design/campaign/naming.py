@@ -17,7 +17,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
 
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.diagnosis.candidates import commonness
@@ -26,6 +25,7 @@ from syncline_design.diagnosis.result import Scope
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import chi_square_beyond
 
 LEAST_GAIN: Final = 3.0  # nat, below which a candidate is not looked at
 AS_GOOD_NATS: Final = 2.0  # within which the commoner of two effects is named
@@ -319,7 +319,7 @@ def _unlike(common: Fitted, separate: Fitted, k: int, temper: float) -> float:
     more = freedom(separate, k) - freedom(common, k)
     if more <= 0:
         return 1.0
-    return float(chi2.sf(2.0 * max(separate.gain - common.gain, 0.0) / temper, more))
+    return chi_square_beyond(2.0 * max(separate.gain - common.gain, 0.0) / temper, more)
 
 
 def plausible(model: Fitted) -> bool:

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
@@ -44,6 +43,7 @@ from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import student_limit
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.case import Case
 
@@ -178,7 +178,7 @@ def on_average(term: Term, values: Array, once: dict[str, Estimate]) -> dict[str
         return once
     slopes = [p.name for p in term.effect.slopes()]
     means, spreads = values.mean(axis=0), values.std(axis=0, ddof=1) / math.sqrt(count)
-    half = float(student.ppf(0.975, count - 1)) * spreads
+    half = student_limit(0.025, count - 1) * spreads
     found = {}
     for name, each in once.items():
         k = slopes.index(name)

@@ -8,8 +8,6 @@ from dataclasses import field
 from functools import cached_property
 from typing import Final
 
-from scipy.stats import chi2
-
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_shift import delay_made, delay_turns
@@ -31,6 +29,7 @@ from syncline_design.diagnosis.result import Diagnosis, Finding
 from syncline_design.diagnosis.stretches import is_inside
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import chi_square_limit
 from syncline_design.model.normal import NORMAL_95
 
 _BIAS: Final = "bias_m"  # the parameter of a range that is off by a constant
@@ -162,7 +161,7 @@ class LogEvidence:
         sigmas = own.sigma[-len(turns) :]  # one turn is that of the heading
         size = sum((float(p.value) / s) ** 2 for p, s in zip(turns, sigmas, strict=True))
         slower = max(1.0 - own.loudest.low**2, 0.0)
-        return bool(size <= slower * float(chi2.isf(0.05, len(turns))))
+        return bool(size <= slower * chi_square_limit(0.05, len(turns)))
 
     def _is_slow_bias(self, part: Departing) -> bool:
         """Whether a constant of a reading is no more than its figure leaves to noise that is slower

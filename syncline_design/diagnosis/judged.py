@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 from scipy.special import betainc, gammaincc
-from scipy.stats import t
 
 from syncline_design.diagnosis.positive import pseudo_inverse
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import student_limit
 from syncline_design.model.normal import NORMAL_95
 
 QUARTERS = 4
@@ -46,7 +46,7 @@ class Judged:
     def coverage(self) -> float:
         """Standard uncertainties that a 95 % interval spans to either side."""
         counts = [count for _, count in self.jackknives]
-        return float(t.isf(0.025, min(counts) - 1)) if counts else NORMAL_95
+        return student_limit(0.025, min(counts) - 1) if counts else NORMAL_95
 
     @property
     def model_log_p(self) -> float:

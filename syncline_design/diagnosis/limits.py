@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from scipy.stats import norm
 
 from syncline_design.diagnosis.agreement import windows_of
 from syncline_design.diagnosis.checks import MEAN_S
@@ -18,6 +17,7 @@ from syncline_design.diagnosis.scatter import scatter
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import normal_limit
 from syncline_design.model.normal import NORMAL_95
 from syncline_design.model.system import Stage
 
@@ -84,7 +84,7 @@ def _beyond(
     usual = float(np.median(np.diff(np.unique(time_s))))
     noise = scatter(time_s, series)
     spread = np.hypot(noise * np.sqrt(usual / length), np.sqrt(2.0) * pose / length)
-    reach = float(norm.isf(CHANCE / len(means)) * spread)
+    reach = float(normal_limit(CHANCE / len(means)) * spread)
     most = float(np.max(means))
     near = NORMAL_95 * float(spread)
     return Beyond(most, most - near, most + near, most - reach, limit, length, means, reach)

@@ -19,12 +19,12 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
-from scipy.stats import t
 
 from syncline_design.diagnosis.noise import FACTOR_LIMIT, OPEN, SensorKey
 from syncline_design.diagnosis.noise_fit import FACTOR_LEAST
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import student_limit
 
 MOST_ROWS: Final = 3000
 BLOCKS: Final = 16
@@ -164,7 +164,7 @@ def _beats(one: VarianceFit, other: VarianceFit) -> bool:
     """Whether one is cheaper than another, and that in most of the log's blocks."""
     saved = np.array([np.sum(b) for b in np.array_split(other.costs - one.costs, BLOCKS)])
     total, spread = float(np.sum(saved)), float(np.std(saved, ddof=1)) * np.sqrt(BLOCKS)
-    return total > BETTER and total > t.isf(CHANCE, BLOCKS - 1) * spread
+    return total > BETTER and total > student_limit(CHANCE, BLOCKS - 1) * spread
 
 
 def _loud(found: VarianceFit, spreads: Array, sensor: SensorKey, gain: float) -> LoudSensor | None:

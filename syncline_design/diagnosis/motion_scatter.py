@@ -18,6 +18,7 @@ from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import loadings, white_covariance, with_size
 from syncline_design.effects.record import Array
+from syncline_design.model.distributions import student_limit
 
 BLOCKS = 16
 ROUNDS = 5  # of weights from the last fit
@@ -50,8 +51,6 @@ def in_blocks(
 
 def grows_with_motion(data: Data, model: Model, directed: int) -> bool:
     """Whether the error scatters more the faster the motion is, as one directed part says."""
-    from scipy.stats import t
-
     columns, squares, known = _variances(data, model, directed)
     normal, right, parts = in_blocks(columns, squares, known)
     if not own_share(normal) > TOLD_APART:
@@ -59,7 +58,7 @@ def grows_with_motion(data: Data, model: Model, directed: int) -> bool:
     value = variances_of(normal, right)[-1]
     left = np.array([variances_of(normal - n, right - r)[-1] for n, r in parts])
     spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((left - left.mean()) ** 2))
-    return bool(value > t.isf(CHANCE, BLOCKS - 1) * spread)
+    return bool(value > student_limit(CHANCE, BLOCKS - 1) * spread)
 
 
 def _variances(data: Data, model: Model, directed: int) -> tuple[Array, Array, Array]:

@@ -19,13 +19,13 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
 
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import SensorKey, White, as_specified, white_covariance
 from syncline_design.diagnosis.unlike_readings import READINGS, Unlike, slopes_of_readings
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import student_limit
 from syncline_design.model.normal import NORMAL_95
 
 BLOCKS: Final = 16
@@ -98,7 +98,7 @@ def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[
     off = np.array(less) - np.mean(less, axis=0)
     spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum(off**2, axis=0))
     slow = np.array([_of_slow(data, model, one) for one in split])
-    reach = np.hypot(float(t.isf(0.025, BLOCKS - 1)) * spread, NORMAL_95 * slow)
+    reach = np.hypot(student_limit(0.025, BLOCKS - 1) * spread, NORMAL_95 * slow)
     found: dict[SensorKey, list[tuple[NoiseFactor, float]]] = {}
     for one, v, r in zip(split, values, reach, strict=True):
         names = tuple(READINGS[one.sensor[1]][k] for k in one.readings)

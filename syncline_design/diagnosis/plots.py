@@ -24,6 +24,7 @@ from syncline_design.diagnosis.remainder_plots import (
 )
 from syncline_design.diagnosis.search import SearchResult
 from syncline_design.effects.record import Array
+from syncline_design.model.distributions import normal_limit
 
 MOST_POINTS = 800
 NOMINAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
@@ -76,12 +77,10 @@ def _map(cells: tuple[Regime, ...]) -> tuple[CovariateMap, ...]:
 
 def _coverage(data: Data, before: Array, after: Array) -> tuple[Coverage, ...]:
     """Share of components inside the expected interval, against the nominal share."""
-    from scipy.stats import norm
-
     visible = np.isfinite(data.view.log.truth_m)
     rows = []
     for nominal in NOMINAL:
-        k = float(norm.isf(0.5 * (1.0 - nominal)))
+        k = float(normal_limit(0.5 * (1.0 - nominal)))
         shares = [float(np.mean(np.abs(scaled[visible]) < k)) for scaled in (before, after)]
         rows.append(Coverage(nominal, shares[0], shares[1]))
     return tuple(rows)

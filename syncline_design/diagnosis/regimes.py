@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.fitting import inner, inverse_scaled
@@ -17,6 +16,7 @@ from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import groups, per_stamp
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import chi_square_limit
 
 BINS = 6
 SMOOTH_S, LEAST_HALF = 3.0, 3
@@ -135,7 +135,7 @@ def first_disagreement_s(view: Scene, error: Array, known: Precision) -> float |
     together at 1 %.
     """
     weighted = known.solve(np.nan_to_num(error)[:, :, None])[:, :, 0]
-    limit = chi2.isf(0.01 / WINDOWS, 3)
+    limit = chi_square_limit(0.01 / WINDOWS, 3)
     edges = np.linspace(0, len(view), WINDOWS + 1).astype(int)
     for a, b in itertools.pairwise(edges):
         if b - a < 2:

@@ -12,11 +12,11 @@ shifts of the whitened error against the regressors show how large it is for thi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
 
 from syncline_design.diagnosis.candidates import Candidate, signatures, slopes
 from syncline_design.diagnosis.consequence import rms_m
@@ -32,6 +32,7 @@ from syncline_design.effects.kinematics import (
 )
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import chi_square_beyond, normal_beyond
 
 Shifts = NDArray[np.int64]
 MOST_ROWS = 6000  # of a longer log, windows
@@ -78,7 +79,7 @@ def remainder(
     tested = [_energy(data, model, family, residual, shifts) for family in families]
     freedom = sum(t.freedom for t in tested)
     peak = max(t.peak for t in tested)
-    p_peak = min(1.0, 2.0 * float(norm.sf(np.sqrt(peak))) * freedom)
+    p_peak = min(1.0, 2.0 * normal_beyond(math.sqrt(peak)) * freedom)
     p_constant = 1.0
     if model.acting:
         tested.append(_energy(data, model, _constancy_columns(data, model), residual, shifts))
@@ -121,7 +122,7 @@ def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Sh
     grown = float(np.median(energies)) / max(freedom, 1)
     inflation = float(np.clip(grown, 1.0, MOST_INFLATION))
     peak = float(np.max((score * single) ** 2, initial=0.0)) / inflation
-    p = float(chi2.sf(float(seen @ seen) / inflation, max(freedom, 1)))
+    p = chi_square_beyond(float(seen @ seen) / inflation, max(freedom, 1))
     size_m = _predicted_m(data, model, (columns, weighted), residual, own.shape[2])
     return _Tested(p, peak, freedom, size_m)
 

@@ -18,6 +18,7 @@ from syncline_design.diagnosis.regimes import covariates
 from syncline_design.diagnosis.search import SearchResult
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import per_stamp
+from syncline_design.model.distributions import chi_square_limit, normal_limit
 from syncline_design.model.figure_text import rounded
 
 ARROWS = 60  # stretches of the log, an arrow each
@@ -68,8 +69,6 @@ def spectrum_of(data: Data, result: SearchResult) -> Spectrum | None:
 
     most: what the highest of the bands of white noise seldom exceeds (one log in a hundred).
     """
-    from scipy.stats import chi2
-
     time_s, series = per_stamp(data.view.log.time_s, _white(data, result))
     count = len(time_s)
     if count < LEAST_ROWS:
@@ -85,7 +84,7 @@ def spectrum_of(data: Data, result: SearchResult) -> Spectrum | None:
     bands = list(itertools.pairwise(ends))
     wide = np.array([b - a for a, b in bands])
     freedom = 2.0 * wide * series.shape[1]
-    limit = chi2.isf(0.01 / len(bands), freedom) / freedom
+    limit = chi_square_limit(0.01 / len(bands), freedom) / freedom
     mean = [float(np.mean(power[a:b])) for a, b in bands]
     at = [float(np.sqrt(cycles[a] * cycles[b - 1])) for a, b in bands]
     return Spectrum(listed(np.array(at)), listed(np.array(mean)), listed(limit))
@@ -93,8 +92,6 @@ def spectrum_of(data: Data, result: SearchResult) -> Spectrum | None:
 
 def normal_of(data: Data, result: SearchResult) -> NormalPlot:
     """Quantiles of the whitened remainder beside those of the standard normal."""
-    from scipy.stats import norm
-
     shares = np.array([*SHARES, *(1.0 - s for s in reversed(SHARES[:-1]))])
     found = _white(data, result).ravel()
-    return NormalPlot(listed(norm.ppf(shares)), listed(np.quantile(found, shares)))
+    return NormalPlot(listed(normal_limit(1.0 - shares)), listed(np.quantile(found, shares)))

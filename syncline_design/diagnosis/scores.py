@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from scipy.stats import chi2
 
 from syncline_design.diagnosis.candidates import Signature, slopes
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled, solve_scaled
@@ -28,6 +27,7 @@ from syncline_design.effects.kinematics import gauss_markov
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import groups
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import chi_square_log_beyond
 
 DRAWS = 3000  # clean scores drawn for the distribution of the largest
 MOST_ROWS = 6000  # of a longer log the noise is known well enough
@@ -114,8 +114,7 @@ _GRID = np.linspace(0.0, 80.0, 401)
 
 @cache
 def _log_p_grid(freedom: int) -> Array:
-    grid: Array = chi2.logsf(_GRID, freedom)
-    return grid
+    return chi_square_log_beyond(_GRID, freedom)
 
 
 def _log_p(squares: Array, freedom: int) -> Array:
@@ -126,7 +125,7 @@ def _log_p(squares: Array, freedom: int) -> Array:
 
 def log_p_of(statistic: float, freedom: int) -> float:
     """log of the upper tail of chi-square, by its asymptote where the library's underflows."""
-    found = float(chi2.logsf(max(statistic, 0.0), freedom))
+    found = float(chi_square_log_beyond(max(statistic, 0.0), freedom))
     if math.isfinite(found):
         return found
     half = 0.5 * statistic

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.stats import chi2, f, t
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, hidden_by_noise, zero_values
 from syncline_design.diagnosis.consequence import SpecPromise, blind_spots
@@ -16,6 +15,7 @@ from syncline_design.diagnosis.result import BlindSpot, Informative, Smallest
 from syncline_design.diagnosis.search import Search, SearchResult
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import chi_square_limit, fisher_limit, student_limit
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.normal import NEARLY_ALL
 
@@ -99,7 +99,7 @@ def left_within(one: Judged) -> Array:
     test of equivalence (Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987)).
     """
     counts = [count for _, count in one.jackknives]
-    times = float(t.isf(0.05, min(counts) - 1)) if counts else NEARLY_ALL
+    times = student_limit(0.05, min(counts) - 1) if counts else NEARLY_ALL
     found: Array = np.abs(one.values) + times * one.spread
     return np.where(one.spread > 0.0, found, math.inf)
 
@@ -124,9 +124,9 @@ def _both(covariance: Array, log_p: float, count: int = 0) -> Array:
     chance = math.exp(log_p)
     if count:
         own = count - freedom
-        limit = float(f.isf(chance, freedom, own)) * freedom * (count - 1) / own
+        limit = fisher_limit(chance, freedom, own) * freedom * (count - 1) / own
     else:
-        limit = float(chi2.isf(chance, freedom))
+        limit = float(chi_square_limit(chance, freedom))
     roots = np.array([[math.sqrt(limit)], [math.sqrt(limit) + NEARLY_ALL]])
     sizes: Array = roots / np.sqrt(np.maximum(alone, 1e-300))
     return sizes

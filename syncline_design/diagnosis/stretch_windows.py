@@ -11,10 +11,14 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, f
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import (
+    chi_square_limit,
+    chi_square_log_beyond,
+    fisher_log_beyond,
+)
 
 LEAST_ROWS: Final = 3  # of a window
 GROWTH: Final = math.sqrt(2.0)  # from one length to the next
@@ -79,7 +83,7 @@ def scanned(sums: BlockSums, width: int) -> Iterator[Windows]:
     """All windows, length by length; the noise of a length is at least that of the shorter ones."""
     lengths = _lengths(sums)
     blocks = len(sums.first) - 1
-    middle = float(chi2.median(width))
+    middle = float(chi_square_limit(0.5, width))
     base = floor2 = 0.0
     usual = math.inf
     for length in lengths:
@@ -156,13 +160,13 @@ def _without_one(sums: BlockSums, length: int, which: NDArray[np.int64], width: 
 
 def _log_chi2(square: Array, freedom: int) -> Array:
     """log of the upper tail of chi-square, by its leading term where the library's underflows."""
-    found: Array = chi2.logsf(square, freedom)
+    found = chi_square_log_beyond(square, freedom)
     return np.where(np.isfinite(found), found, -0.5 * square)
 
 
 def _log_f(share: Array, first: int, second: Array) -> Array:
     """The same of F: -(n2 / 2) log(1 + n1 F / n2)."""
-    found: Array = f.logsf(share, first, second)
+    found = fisher_log_beyond(share, first, second)
     return np.where(np.isfinite(found), found, -0.5 * second * np.log1p(first * share / second))
 
 

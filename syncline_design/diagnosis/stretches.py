@@ -22,7 +22,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, zero_values
 from syncline_design.diagnosis.covariance import Precision
@@ -50,6 +49,7 @@ from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.random_numbers import generator
+from syncline_design.model.distributions import chi_square_limit
 from syncline_design.model.normal import NEARLY_ALL
 
 MOST_BLOCKS: Final = 1200  # that windows are made of; of a longer log several rows each
@@ -311,7 +311,7 @@ def _reaches(
     sizes = []
     for one in windows:
         charge = math.log(DOUBT) - math.log(len(windows) * PLACES * blocks / one.length)
-        root = math.sqrt(float(chi2.isf(math.exp(charge), width))) + NEARLY_ALL
+        root = math.sqrt(chi_square_limit(math.exp(charge), width)) + NEARLY_ALL
         alone = 1.0 - 1.0 / one.length if one.length <= ALONE else 1.0
         known = alone * np.quantile(one.alone, NEARLY_ALL_PLACES, axis=0)
         size = root * np.sqrt(one.scale2 / np.maximum(known, 1e-300))

@@ -11,6 +11,7 @@ from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import NoiseLevel, Structure, white_covariance
 from syncline_design.effects.record import OUTLIER_FACTOR, Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import normal_log_density, student_log_density
 
 FREEDOMS = np.geomspace(1.2, 30.0, 25)
 FAR = 5.0  # core standard deviations beyond which a row is taken for an outlier at first
@@ -55,16 +56,14 @@ def scaled_remainder(
 
 def tails_of(z: Array) -> Tails:
     """Fit Student's t with a scale to standardised components (n, axes)."""
-    from scipy.stats import norm, t
-
     values = z.ravel()
     if not float(np.median(np.abs(values))) > 0.0:  # more than half are zero: no noise to judge
         return Tails(0.0, math.inf, math.inf, 0.0)
-    plain = float(np.sum(norm.logpdf(values, scale=float(np.std(values)))))
+    plain = float(np.sum(normal_log_density(values, float(np.std(values)))))
     found = []
     for freedom in FREEDOMS:
         scale = _scale(values, float(freedom))
-        found.append(float(np.sum(t.logpdf(values, freedom, scale=scale))))
+        found.append(float(np.sum(student_log_density(values, float(freedom), scale))))
     gain = max(found) - plain
     mixed = [_mixture(z, float(freedom)) for freedom in FREEDOMS]
     rate = 0.0
