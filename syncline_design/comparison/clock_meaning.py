@@ -17,7 +17,7 @@ from syncline_design.verdict.measured import COMMONLY, coverage_of
 from syncline_design.verdict.named import NamedRole
 from syncline_design.verdict.pinned import as_measured
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import Provenance, Verdict, Word
+from syncline_design.verdict.tree import Provenance, RequirementResult, Verdict, Word
 from syncline_design.verdict.verify import check_loaded
 
 
@@ -47,7 +47,7 @@ class TimingMeaning(Record):
 
     tau_s, total_m: of the whole system, the largest timestamp difference and the error.
     asked_coverage: the share of the time for which the spec takes its bounds to hold, where the
-    claim is for less.
+    claim is for less.  accuracy: the limit that the error is held against.
     """
 
     name: str
@@ -62,6 +62,7 @@ class TimingMeaning(Record):
     sensors: tuple[SensorUnderTiming, ...]
     asked_coverage: float | None = optional()
     provenance: Provenance | None = optional()
+    accuracy: RequirementResult | None = optional()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,8 +95,14 @@ def timing_meaning(
         before.name, before.file, before.verdict, None if after is None else after.verdict,
         _tau(before), _tau(after), _total(before), _total(after),
         _changes(before, after), _sensors(before, after, bound), _asked(case, study.timing),
-        before.provenance,
+        before.provenance, _accuracy(before),
     )  # fmt: skip
+
+
+def _accuracy(before: Verdict) -> RequirementResult | None:
+    """The tightest limit of the error."""
+    rows = [row for row in before.requirements if row.kind == "accuracy"]
+    return min(rows, key=lambda row: row.limit, default=None)
 
 
 def _asked(case: Case, timing: Timing) -> float | None:

@@ -9,7 +9,7 @@ from syncline_design.auditing.result import StampFault, StreamAudit
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
-from syncline_design.report.palette import BAD, MUTED, SERIES, SHADE, WARN
+from syncline_design.report.palette import BAD, MUTED, SERIES, SHADE, SURFACE, WARN
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def _faults(axes: Axes, row: StreamAudit) -> None:
             name, (first.from_s or 0.0, 0.97 - 0.17 * (k % 5)),
             xycoords=("data", "axes fraction"), xytext=(3, 0), textcoords="offset points",
             color=BAD if first.counts else MUTED, va="top", zorder=6,
+            bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.8},  # over lines, not on them
         )  # fmt: skip
 
 

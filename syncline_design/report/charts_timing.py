@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from syncline_design.clocks.result import SessionResult, StabilityPoint, TracePoint
 from syncline_design.report import axes as scales
@@ -17,8 +17,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+FAR: Final = 10.0  # a bound so many times the largest offset would leave the offsets a flat line
+
+
+def in_sight(trace: Sequence[TracePoint], bound_s: float | None) -> bool:
+    """Whether the bound is near enough to be drawn with the offsets."""
+    return bool(bound_s) and (bound_s or 0.0) <= FAR * _worst(trace)
+
+
+def _worst(trace: Sequence[TracePoint]) -> float:
+    return max(max(abs(p.low_s), abs(p.high_s)) for p in trace)
+
+
 def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
-    """Offset over time, the sessions one after another; the bound as two lines."""
+    """Offset over time, the sessions one after another; the bound as two lines where it is near."""
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
@@ -34,7 +46,7 @@ def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
             if k % 2:
                 axes.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
         for side in (-1.0, 1.0):
-            if bound_s:
+            if bound_s and in_sight(trace, bound_s):
                 axes.axhline(side * bound_s, color=SERIES[1], linewidth=1.2, linestyle=(0, (5, 3)))
         low, high = axes.get_ylim()
         scales.set_ticks(axes, "y", _linear(low, high), _time_or_zero)
@@ -42,8 +54,7 @@ def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
         axes.set_ylabel("local \N{MINUS SIGN} reference")
         scales.grid(axes, "y")
 
-    worst = max(max(abs(p.low_s), abs(p.high_s)) for p in trace)
-    spoken = f"largest offset {numbers.time(worst)}"
+    spoken = f"largest offset {numbers.time(_worst(trace))}"
     if bound_s:
         spoken += f", bound {numbers.time(bound_s)}"
     return draw("fig-offsets", "Offset over time", spoken, (WIDTH, 240.0), build)

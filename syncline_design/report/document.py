@@ -9,7 +9,7 @@ Each node says how far it reaches: `everywhere`, only on the `page`, or only in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
@@ -259,6 +259,12 @@ def section(key: str, title: str, nodes: Iterable[Node], label: str = "",
     """A section, or nothing where nothing stands in it; its label is its title unless given."""
     found = tuple(nodes)
     return [Section(key, title, label or title, found, reach)] if found else []
+
+
+def folded(document: Document, left_open: Collection[str]) -> Document:
+    """What answers stays open on a page, by key; what it rests on opens when it is asked for."""
+    parts = (replace(part, folded=part.key not in left_open) for part in document.sections)
+    return replace(document, sections=tuple(parts))
 
 
 def provenance(pairs: Sequence[tuple[str, str]], reach: Audience = "page") -> list[Section]:

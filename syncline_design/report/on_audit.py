@@ -85,11 +85,11 @@ def on_audit(result: Audit) -> Document:
         sections=(
             *section("incomplete", "Files that are damaged", _damaged(result), "Damaged"),
             *section("faults", "Faults by stream", list(_faults(result)), "Faults"),
-            *section("offsets", "Receipt minus stamp over time", list(_charts(result)),
-                     "Over time"),
-            *section("streams", "Streams", show(_streams(result), silent=True)),
             *section("left", "What is left once every named fault is out",
                      show(_left(result), silent=True), "Residuals"),
+            *section("streams", "Streams", show(_streams(result), silent=True)),
+            *section("offsets", "Receipt minus stamp over time", list(_charts(result)),
+                     "Over time"),
             *section("roles", "What each stream was taken as", _roles(result), "Roles"),
             *section("open", "What these stamps cannot show", _open(result), "Cannot show"),
             *section("notes", "Notes", [Items(tuple(given(n) for n in result.notes))]
@@ -136,7 +136,9 @@ def _sentences(result: Audit) -> Iterator[Inline]:
     else:
         names = ", ".join(row.name for row in faulty[:6])
         more = f" and {len(faulty) - 6} more" if len(faulty) > 6 else ""
-        yield f"{len(faulty)} of {len(result.streams)} streams have faults: {names}{more}."
+        of = len(result.streams)
+        have = "stream has" if of == 1 else "streams have"
+        yield f"{len(faulty)} of {of} {have} faults: {names}{more}."
     if any(f.fault == "recorder_clock" for row in result.streams for f in row.faults):
         yield "The recorder's own clock moved: every stream shows it, none of them is to blame."
     if result.unreadable:

@@ -9,17 +9,19 @@ from syncline_design.clocks.result import Timing, TimingClaim
 from syncline_design.comparison.clock_meaning import TimingAndSpec, TimingMeaning
 from syncline_design.model.figure_text import format_duration
 from syncline_design.report import numbers
-from syncline_design.report.charts_timing import offsets, sessions, stability
+from syncline_design.report.charts_timing import in_sight, offsets, sessions, stability
 from syncline_design.report.document import (
     Chart,
     Document,
     Facts,
+    Group,
     Inline,
     Items,
     Node,
     Outcome,
     Text,
     code,
+    folded,
     given,
     provenance,
     section,
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
 
 _MOST_ROWS: Final = 40
+_MOST_OPEN: Final = 12  # rows of a table that is not folded away
+_OPEN: Final = ("doubts", "spec", "claim", "entry", "offsets", "sessions", "events", "notes")
 _RESTS: Final = {
     "independent": "a measurement that does not steer the clock",
     "servo": "the offsets of the servo itself: it nulls what it measures, so a constant asymmetry "
@@ -52,7 +56,7 @@ _METHODS: Final = {
 
 def on_timing(result: TimingAndSpec) -> Document:
     """Logs of a clock as a document."""
-    return Document(
+    return folded(Document(
         family="Timing evidence",
         outcome=_outcome(result),
         name=result.source.name,
@@ -61,8 +65,8 @@ def on_timing(result: TimingAndSpec) -> Document:
         sections=(
             *section("doubts", "Not to be used before this is explained", _doubts(result),
                      "Doubts"),
-            *section("claim", "What may be claimed", _claim(result), "Claim"),
             *section("spec", "What it means for the spec", _spec(result), "Spec"),
+            *section("claim", "What may be claimed", _claim(result), "Claim"),
             *section("entry", "Catalog entry", _entry(result), "Entry"),
             *section("offsets", "Offset over time", _offsets(result), "Offsets"),
             *section("sessions", "Sessions", _sessions(result)),
@@ -75,7 +79,7 @@ def on_timing(result: TimingAndSpec) -> Document:
             *provenance(_provenance(result)),
         ),
         title=f"Timing: {result.source.name}",
-    )  # fmt: skip
+    ), _OPEN)  # fmt: skip
 
 
 def _provenance(result: TimingAndSpec) -> list[tuple[str, str]]:
@@ -142,7 +146,14 @@ def _facts(result: Timing) -> Iterator[tuple[str, str]]:
         yield "Statistical bound", numbers.time(result.statistical_bound_s)
         yield "Hard bound", numbers.time(result.hard_bound_s)
         yield "With events", numbers.time(result.event_bound_s)
-    yield "Sessions", f"{claim.sessions}, {numbers.duration(3600.0 * claim.hours)}"
+    yield "Sessions", f"{claim.sessions}, {_operated(claim.hours)}"
+
+
+def _operated(hours: float) -> str:
+    """How long all sessions together last."""
+    if hours < 1.0:
+        return numbers.duration(3600.0 * hours)
+    return f"{numbers.number(hours, 3)}\N{NO-BREAK SPACE}h"
 
 
 def _doubts(result: Timing) -> list[Node]:
@@ -198,16 +209,16 @@ def _spec(result: TimingAndSpec) -> list[Node]:
     if means.asked_coverage is not None:
         asked, share = means.asked_coverage, result.claim.coverage
         nodes.append(Text(
-            f"The bound is claimed {coverage_words(share, asked)}: measure with "
-            f"--coverage {numbers.number(asked, 4)}.",
+            f"The bound is claimed {numbers.unbroken(coverage_words(share, asked))}: measure with "
+            f"`--coverage {numbers.number(asked, 4)}`.",
             mark="!", tone="warn",
         ))  # fmt: skip
     if means.after is not None and means.tau_s is not None and means.measured_tau_s is not None:
         nodes.append(Facts((
             ("\u03c4 of the system", f"{numbers.time(means.tau_s)}, with this clock "
              f"{numbers.time(means.measured_tau_s)}"),
-            ("Error of the system", f"{numbers.length(means.total_m)}, with this clock "
-             f"{numbers.length(means.measured_total_m)}"),
+            ("Error of the system", f"{numbers.error(means.total_m, means.accuracy)}, with this "
+             f"clock {numbers.error(means.measured_total_m, means.accuracy)}"),
         ), "record"))  # fmt: skip
     if (
         means.after is not None
@@ -273,7 +284,11 @@ def _offsets(result: Timing) -> list[Node]:
 
     if not result.trace:
         return []
-    words = "Local minus reference: a clock that is late is below zero. Dashed: the bound."
+    words = "Local minus reference: a clock that is late is below zero. "
+    if in_sight(result.trace, result.bound_s):
+        words += "Dashed: the bound."
+    elif result.bound_s is not None:
+        words += f"The bound, {numbers.time(result.bound_s)}, lies far beyond what is drawn."
     return [Chart("offsets", draw, words)]
 
 
@@ -286,8 +301,11 @@ def _sessions(result: Timing) -> list[Node]:
         return sessions(counted, result.claim.coverage, bounds)
 
     chart: list[Node] = [Chart("sessions", draw, "One dot a session.")] if counted else []
-    return [*chart, *show(_session_table(result, 10_000), silent=True, reach="page"),
-            *show(_session_table(result, _MOST_ROWS), silent=True, reach="text")]  # fmt: skip
+    every = show(_session_table(result, 10_000), silent=True, reach="page")
+    if len(result.sessions) > _MOST_OPEN:
+        summary = f"Every session ({numbers.count(len(result.sessions))} rows)"
+        every = [Group(tuple(every), "fold", summary=summary, reach="page")]
+    return [*chart, *every, *show(_session_table(result, _MOST_ROWS), silent=True, reach="text")]
 
 
 def _session_table(result: Timing, most: int) -> Table:
@@ -295,12 +313,12 @@ def _session_table(result: Timing, most: int) -> Table:
         (
             Cell(str(k), k),
             Cell(row.from_, sub="" if row.counted else "too short"),
-            Cell(format_duration(row.duration_s), row.duration_s),
+            Cell(numbers.duration(row.duration_s), row.duration_s),
             Cell(numbers.count(row.samples), row.samples),
             Cell(numbers.time(row.median_s), row.median_s),
             Cell(numbers.time(row.quantile_s), row.quantile_s),
             Cell(numbers.time(row.hard_s), row.hard_s),
-            Cell("" if row.autocorrelation_s is None else format_duration(row.autocorrelation_s),
+            Cell("" if row.autocorrelation_s is None else numbers.duration(row.autocorrelation_s),
                  row.autocorrelation_s),
             {True: "yes", False: "no", None: ""}[row.stationary],
         )

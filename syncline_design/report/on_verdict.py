@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncline_design.choice.outcome import ROADS
@@ -28,6 +27,7 @@ from syncline_design.report.document import (
     Section,
     Text,
     code,
+    folded,
     given,
     provenance,
     section,
@@ -95,13 +95,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
             *_provenance(verdict),
         ),
         source=verdict.file,
-    ))  # fmt: skip
-
-
-def folded(document: Document) -> Document:
-    """What answers stays open on a page; what it rests on opens when asked for."""
-    parts = (replace(part, folded=part.key not in OPEN) for part in document.sections)
-    return replace(document, sections=tuple(parts))
+    ), OPEN)  # fmt: skip
 
 
 def _at_a_glance(verdict: Verdict) -> list[Node]:
