@@ -135,7 +135,7 @@ def test_a_finding_in_a_spec_reads_as_it_was_found(
     effect: str, parameters: dict[str, float], words: str
 ) -> None:
     """The sentence of `check` about a known effect has the figures of `diagnose`'s sentence."""
-    from syncline_design.diagnosis.findings import estimate, finding
+    from syncline_design.diagnosis.finding import estimate, finding
     from syncline_design.effects import registry
     from syncline_design.model.known import EffectEntry
     from syncline_design.spec.known_effects import describe

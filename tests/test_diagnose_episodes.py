@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis import Diagnosis, diagnose
 from syncline_design.diagnosis.episodes import _best_run, _stands_out
 from syncline_design.effects import registry
-from syncline_design.report.on_diagnosis import noise_lines
+from syncline_design.report.on_findings import noise_lines
 from syncline_design.spec.edit import with_effects
 from syncline_design.spec.load import load
 from tests.test_effects import rows

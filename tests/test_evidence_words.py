@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from syncline_design.diagnosis.findings import evidence_words
+from syncline_design.diagnosis.finding import evidence_words
 
 
 @pytest.mark.parametrize("chance", [0.3, 2e-5, 7.4e-13, 9.6e-8, 1e-4, 9.49e-299])

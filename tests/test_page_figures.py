@@ -16,7 +16,8 @@ from syncline_design.report import numbers
 from syncline_design.report.axes import log_ticks
 from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
 from syncline_design.report.on_choice import on_choice
-from syncline_design.report.on_diagnosis import NAT, on_diagnosis
+from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.on_findings import NAT
 from syncline_design.report.on_study import shown_value
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimizations import render_optimize

@@ -15,7 +15,7 @@ from diagnosis_samples import DESIGN, LATENCY, diagnosis
 from html_page import Page
 from syncline_design.comparison.meaning import DiagnosisAndDesign, ErrorFigure
 from syncline_design.comparison.repairs import Repair, RepairStep
-from syncline_design.diagnosis.findings import estimate, finding
+from syncline_design.diagnosis.finding import estimate, finding
 from syncline_design.diagnosis.gap_result import WholeGap
 from syncline_design.diagnosis.result import (
     Estimate,

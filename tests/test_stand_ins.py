@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
-from syncline_design.diagnosis.findings import finding
+from syncline_design.diagnosis.finding import finding
 from syncline_design.diagnosis.fitting import fit
 from syncline_design.diagnosis.result import Diagnosis, Estimate
 from syncline_design.diagnosis.run import prepared, stand_ins

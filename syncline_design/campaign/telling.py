@@ -14,7 +14,7 @@ from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import Weights, promise_of
-from syncline_design.diagnosis.findings import estimate, evidence_words, finding
+from syncline_design.diagnosis.finding import estimate, evidence_words, finding
 from syncline_design.diagnosis.gap_result import Remaining, WholeGap
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.plotted import (

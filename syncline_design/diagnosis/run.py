@@ -19,12 +19,7 @@ from syncline_design.diagnosis.candidates import (
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.consequence import SpecPromise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.findings import (
-    entry_of,
-    episode_finding,
-    findings,
-    with_unlike_readings,
-)
+from syncline_design.diagnosis.findings import entry_of, findings
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
 from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
@@ -37,6 +32,7 @@ from syncline_design.diagnosis.motion_columns import (
     merged_checks,
     with_slopes,
 )
+from syncline_design.diagnosis.noise_findings import episode_finding, with_unlike_readings
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import (
     covariates,

@@ -52,7 +52,7 @@ def shown(result: object) -> str | None:
 
 def on_finding(found: Finding) -> Document:
     """One finding of a diagnosis by itself."""
-    from syncline_design.report.on_diagnosis import finding_node
+    from syncline_design.report.on_findings import finding_node
 
     outcome = Outcome("warn", "!", found.effect.replace("_", " "))
     name = f"{found.sensor}, {found.stage}"
