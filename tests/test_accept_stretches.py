@@ -146,6 +146,41 @@ def slipping(folder: Path, share: float) -> tuple[Path, Path]:
     return spec, log
 
 
+def moved_for_a_while(folder: Path, *parts: tuple[float, float]) -> tuple[Path, Path]:
+    """Spec and log of a vehicle whose ranging sensor is turned by 0.5 deg in parts of its log."""
+    run = world("multirotor_lines", 9)
+    spec, log = files(folder, run)
+    lines = log.read_text("utf-8").splitlines()
+    turned = make_log(run, (hidden("boresight", "ranging", x_rad=0.009, y_rad=0.0, z_rad=0.0),))
+    other = turned.to_csv(folder / "turned.csv").read_text("utf-8").splitlines()
+    for first, last in parts:
+        rows = slice(1 + round(first * len(lines)), 1 + round(last * len(lines)))
+        lines[rows] = other[rows]
+    log.write_text("\n".join(lines) + "\n", "utf-8")
+    return spec, log
+
+
+@pytest.mark.parametrize("parts", [((0.3, 0.6),), ((0.15, 0.35), (0.6, 0.85))])
+def test_a_mount_that_is_moved_and_put_back_is_no_noise(
+    parts: tuple[tuple[float, float], ...], tmp_path: Path
+) -> None:
+    """For 18 s of 60, or twice for 12 and 15 s: every sensor scatters as its figure says."""
+    spec, log = moved_for_a_while(tmp_path, *parts)
+    told = accept(load(spec), [log], AcceptSettings(("mounting", "noise")), seed=0)
+    assert told.exit_code == 1, told.assumptions
+    for row in told.assumptions:
+        if row.assumption == "noise":
+            assert row.status != "broken", row
+            assert row.measured is None or (row.measured.low or 0.0) <= 1.0, row
+    named = [row for row in told.assumptions if row.one_of or row.status == "broken"]
+    assert {row.assumption for row in named} == {"mounting"}
+    for row in named:
+        assert row.from_s is not None
+        assert row.to_s is not None
+        assert any(60.0 * first - 1.0 < row.from_s < row.to_s < 60.0 * last + 1.0
+                   for first, last in parts), row  # fmt: skip
+
+
 def test_a_mount_that_slips_stands_out(tmp_path: Path) -> None:
     """The last tenth of the rows is that of a vehicle whose ranging sensor is turned by 0.5 deg."""
     first = seen(*slipping(tmp_path, 0.9)).stands[0]

@@ -202,28 +202,34 @@ def test_a_bias_that_slower_noise_could_leave_breaks_no_figure(
 
 
 @pytest.mark.parametrize(
-    ("verdict", "low", "status"),
+    ("verdict", "low", "std_m", "status"),
     [
-        ("unexplained", 0.0, "not_shown"),
-        ("unexplained", 1.2, "broken"),
-        ("explained", 0.0, "broken"),
+        ("unexplained", 0.0, 0.020, "not_shown"),
+        ("unexplained", 1.2, 0.020, "broken"),
+        ("explained", 0.0, 0.020, "broken"),  # 1.31 of the figure by itself
+        ("explained", 0.0, 0.015, "not_shown"),  # 0.98: neither is beyond 1
+        ("explained", 0.0, 0.050, "not_shown"),  # 3.3, and positions scatter 1.41 at most
     ],
 )
 def test_noise_in_the_shape_of_what_has_no_name_breaks_no_figure(
-    found: Diagnosis, verdict: str, low: float, status: str
+    found: Diagnosis, verdict: str, low: float, std_m: float, status: str
 ) -> None:
     """Slow noise takes the shape of whatever is missing, unless the figure itself is exceeded."""
     case = load(EXAMPLE)
     on_paper = check_loaded(case, CheckSettings(monte_carlo=False))
+    part = replace(found.findings[0].parameters["latency_s"], value=std_m, unit="m",
+                   standard_uncertainty=0.0005, interval95=None)  # fmt: skip
     slow = replace(found.findings[0], effect="correlated_noise", sensor="position", also=None,
-                   parameters={}, kind="noise", material=True, aliases=())  # fmt: skip
+                   parameters={"std_m": part}, kind="noise", material=True, aliases=())  # fmt: skip
     split = NoiseFactors((NoiseFactor(max(low, 0.5), low, 1.41),), (1.0,), (0.012, 0.012, 0.02))
     one = next(a for a in assumptions(case, on_paper) if (a.role, a.name) == ("position", "noise"))
     told = replace(found, findings=(slow,), verdict=verdict)
     sight = Sighted(told, factors={f"{one.stage}/position": split})
     row = by_log(one, LogEvidence(told, OnPaper(case, ()), one.stage, sight=sight))
     assert row.status == status, row
-    assert ("has no name" in row.words) is (status == "not_shown")
+    assert ("has no name" in row.words) is (verdict == "unexplained" and low < 1.0)
+    beyond = row.measured is not None and row.measured.low is not None and row.measured.low > 1.0
+    assert beyond is (status == "broken")
 
 
 @pytest.mark.parametrize(("low", "status"), [(0.98, "broken"), (0.8, "not_shown")])

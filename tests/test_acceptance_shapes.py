@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,7 +18,9 @@ from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.comparison.shapes import beside_shapes, once_changed
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.noise_split import NoiseFactor, NoiseFactors
+from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis, Finding
+from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
 from syncline_design.spec.load import load
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 from tests.acceptance_samples import (
@@ -60,6 +64,97 @@ def test_no_noise_is_broken_whose_figure_stays_within_the_spec_s(
     assert row.status == "not_shown", row
     assert "cannot tell whose it is" in row.words
     assert row.measured == MeasuredFigure(0.44, 0.0, high)
+
+
+LOUD = NoiseFactors((NoiseFactor(3.0, 2.5, 3.5),), (1.0,), (5e-4, 5e-4, 1e-3))
+SOUND = NoiseFactors((NoiseFactor(1.0, 0.9, 1.05),), (1.0,), (0.012, 0.012, 0.02))
+ON_THE_EDGE = NoiseFactors((NoiseFactor(1.05, 0.4, 3.0),), (1.0,), (0.02, 1e-3, 1e-3))
+MOVED = Stands(("mounting", "attitude", 0), "multirotor", 10.0, 90.0, ("x_rad", "y_rad", "z_rad"),
+               (0.0, 0.01, 0.0), (1e-4, 1e-4, 1e-4), -40.0, sure=True)  # fmt: skip
+
+
+def noisy(found: Diagnosis, factor: float, effect: str = "noise_understated") -> Diagnosis:
+    """A diagnosis that lays noise on the attitude, with a standard uncertainty of 2 %."""
+    part = replace(found.findings[0].parameters["latency_s"], value=factor, unit="",
+                   standard_uncertainty=0.02 * factor, interval95=None)  # fmt: skip
+    loud = replace(found.findings[0], effect=effect, sensor="attitude", also=None, kind="noise",
+                   parameters={"factor": part}, material=True, aliases=(),
+                   from_s=20.0, to_s=20.0 + 0.2 * found.log.duration_s)  # fmt: skip
+    return replace(found, findings=(loud,), verdict="explained")
+
+
+def noise_rows(told: Diagnosis, split: dict[str, NoiseFactors],
+               **seen: Any) -> dict[str, Judgement]:  # fmt: skip
+    factors = {f"multirotor/{role}": own for role, own in split.items()}
+    sight = Sighted(told, factors=factors, **seen)
+    log = LogEvidence(told, OnPaper(load(EXAMPLE), ()), "multirotor", sight=sight)
+    return {role: by_log(row_of(role, "noise"), log) for role in split}
+
+
+@pytest.mark.parametrize(
+    ("seen", "status"),
+    [
+        ({}, "broken"),
+        ({"course": OneCourse(("mounting", "attitude", 0), 40.0, 90.0, 0.9)}, "not_shown"),
+        ({"stretches": Stretches((MOVED,))}, "not_shown"),
+        ({"stretches": Stretches((MOVED,)), "taken": (MOVED,)}, "broken"),
+    ],
+)
+def test_noise_is_broken_unless_one_course_or_what_stands_out_makes_it(
+    found: Diagnosis, seen: dict[str, Any], status: str
+) -> None:
+    """An attitude that was turned for most of a log scatters 3 times as much as it may."""
+    row = noise_rows(noisy(found, 3.0), {"attitude": LOUD}, **seen)["attitude"]
+    assert row.status == status, row
+    if "course" in seen:
+        assert "90 %" in row.words
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.4, "holds"), (0.55, "not_shown")])
+def test_no_row_holds_of_a_log_of_which_most_was_left_out(
+    found: Diagnosis, share: float, status: str
+) -> None:
+    told = replace(found, findings=(), verdict="agrees")
+    row = noise_rows(told, {"position": SOUND}, left_out=share)["position"]
+    assert row.status == status, row
+    assert ("55 % of the log" in row.words) is (status == "not_shown")
+
+
+@pytest.mark.parametrize(("share", "status"), [(0.3, "broken"), (0.1, "holds")])
+def test_what_stands_out_breaks_its_row_where_it_is_as_large_as_what_matters(
+    found: Diagnosis, share: float, status: str
+) -> None:
+    """A turn of 10 urad turns no verdict of this spec: by its share of the spec's noise, then."""
+    slight = replace(MOVED, values=(0.0, 1e-5, 0.0), spreads=(1e-6,) * 3, share=share)
+    one = row_of("attitude", "mounting")
+    told = replace(found, findings=(), verdict="agrees")
+    reach = ShownSize(MOVED.label, "multirotor", "y_rad", "rad", 0.1, (1.0, 2.0), (2e-6, 1e-6))
+    seen = Sighted(told, Stretches((slight,), (reach,)), taken=(slight,))
+    log = LogEvidence(told, OnPaper(load(EXAMPLE), ()), "multirotor", sight=seen)
+    row = by_log(one, log)
+    assert row.status == status, row
+    assert row.measured is not None
+    assert row.measured.high is not None
+    assert row.measured.high >= 1e-5
+    assert ("is slight" in row.words) is (status == "holds")
+
+
+def test_noise_of_a_while_that_its_sensor_cannot_have_may_be_of_the_others(
+    found: Diagnosis,
+) -> None:
+    """4 times for a fifth of the log makes 2 in all of it, and attitudes scatter 1.2 at most."""
+    quiet = NoiseFactors((NoiseFactor(1.1, 1.01, 1.2),), (1.0,), (5e-4, 5e-4, 1e-3))
+    told = noisy(found, 4.0, "noise_episode")
+    rows = noise_rows(told, {"attitude": quiet, "ranging": ON_THE_EDGE, "position": SOUND})
+    assert [rows[role].status for role in ("attitude", "ranging")] == ["not_shown", "not_shown"]
+    assert "those of ranging" in rows["ranging"].words
+    assert rows["position"].status == "holds"
+    loud = NoiseFactors((NoiseFactor(2.0, 0.9, 2.9),), (1.0,), (5e-4, 5e-4, 1e-3))
+    rows = noise_rows(told, {"attitude": loud, "ranging": ON_THE_EDGE})
+    assert rows["attitude"].status == "broken"  # by the finding itself: 1.93 and more
+    assert rows["attitude"].measured is not None
+    assert rows["attitude"].measured.low == pytest.approx(math.sqrt(1 + 0.2 * (3.843**2 - 1)), 1e-3)
+    assert "those of ranging" not in rows["ranging"].words
 
 
 def knocked(found: Diagnosis, *, once: bool, noise_left: bool) -> Diagnosis:

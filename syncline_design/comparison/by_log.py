@@ -10,6 +10,14 @@ from typing import Final
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_motion import CODES, by_motion
+from syncline_design.comparison.by_noise import (
+    broken_figure,
+    is_shape,
+    noise_figure,
+    noise_open,
+    noise_within,
+    readings,
+)
 from syncline_design.comparison.by_shift import by_shifts, shifts, widened
 from syncline_design.comparison.by_stretch import SPOKEN_OF
 from syncline_design.comparison.departing import amount, figure_of
@@ -23,12 +31,10 @@ from syncline_design.comparison.judgement import OF_PLACES, Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.comparison.shapes import beside_shapes, shapes
-from syncline_design.diagnosis.noise import FACTOR_LIMIT
-from syncline_design.diagnosis.noise_split import NoiseFactors
 from syncline_design.diagnosis.result import Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.sentences import or_rivals
-from syncline_design.model.figure_text import format_duration, rounded, to_digits
+from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
 
 # what undoes a departure, so that neither the log nor the objects' places show both together
 _ALONE: Final = {
@@ -47,15 +53,17 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     large = [f for f in own if f.material and f.kind != "stand_in"]
     breaking = [f for f in large if not log.within_figure(one, f)]
     if large and not breaking:
-        return Judgement("not_shown", _as_slow(large), _noise_figure(one, log))
-    unsure = _whose_noise(one, log, breaking)
+        return Judgement("not_shown", _as_slow(large), noise_figure(one, log))
+    unsure = noise_open(one, log, breaking)
     if unsure is not None:
         return unsure
     standing = log.parts.standing(one)
     suspect = _suspect(one, log)
-    breaking = [f for f in breaking if log.is_sure(one, f) and not _is_shape(one, f, log)]
+    breaking = [f for f in breaking if log.is_sure(one, f) and not is_shape(one, f, log)]
     if breaking or (standing is not None and standing.status == "broken"):
-        said = _broken(one, breaking, standing, _noise_figure(one, log), _readings(log.split(one)))
+        said = _broken(
+            one, breaking, standing, broken_figure(one, log, breaking), readings(log.split(one))
+        )
         undone = list(log.parts.undone(one, _width(said.measured)))
         said = _but_for(said, undone, log.parts.room_undone(one), _is_signed(one))
         if one.name == "noise":
@@ -181,47 +189,6 @@ def _broken(
     return Judgement("broken", words, figure, first.from_s, first.to_s)
 
 
-def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) -> Judgement | None:
-    """Noise beyond the figure that the log cannot lay on one sensor."""
-    figure = _noise_figure(one, log)
-    if one.name != "noise" or figure is None or figure.low is None or figure.high is None:
-        return None
-    if breaking and figure.high <= 1.0 and all(_is_scatter(f) for f in breaking):
-        most = to_digits(figure.high, 3)
-        words = (f"{_said(breaking[0])}, but {one.role} readings scatter {most} times the spec's "
-                 "figure at most: this log cannot tell whose it is")  # fmt: skip
-        return Judgement("not_shown", words, figure)
-    whole = all(registry()[f.effect].opens == "factor" for f in breaking)
-    if not breaking or not whole or figure.low > 1.0:
-        return None
-    others = [name.split("/")[1] for name, f in (log.sight.factors if log.sight else {}).items()
-              if name.startswith(f"{one.stage}/") and name != f"{one.stage}/{one.role}"
-              and max(part.high for part in f.parts) > FACTOR_LIMIT]  # fmt: skip
-    if not others:
-        return None
-    words = (f"noise beyond the spec's, of {one.role} or {' or '.join(others)}: this log cannot "
-             f"tell whose ({_said(breaking[0])})")  # fmt: skip
-    return Judgement("not_shown", words, figure)
-
-
-def _is_scatter(finding: Finding) -> bool:
-    """Whether it says how far a sensor's readings scatter, as their figure does."""
-    return finding.kind == "noise" and registry()[finding.effect].opens in (
-        "factor",
-        "slow",
-        "down",
-    )
-
-
-def _is_shape(one: Assumed, finding: Finding, log: LogEvidence) -> bool:
-    """Whether noise may be the shape of what has no name: a slow one takes that of whatever is
-    missing.  It is none where the sensor's figure is shown to be beyond the spec's."""
-    if finding.kind != "noise" or log.found.verdict != "unexplained":
-        return False
-    figure = _noise_figure(one, log)
-    return figure is None or figure.low is None or figure.low <= 1.0
-
-
 def _said(finding: Finding) -> str:
     return finding.sentence + or_rivals(f"{a.effect} ({a.sensor})" for a in finding.aliases)
 
@@ -241,6 +208,9 @@ def _immaterial(one: Assumed, own: Sequence[Finding], paper: OnPaper) -> Judgeme
 def _doubt(one: Assumed, log: LogEvidence) -> str:
     """Why the absence of a finding says nothing here; "" where it does."""
     found = log.found
+    if log.sight is not None and log.sight.left_out > SPOKEN_OF:
+        share = percent(log.sight.left_out, 2)
+        return f"what stands out takes {share} of the log: of so much nothing else is shown"
     if not found.sound:
         first = next(c for c in found.checks if c.severity == "contradiction")
         return f"the log contradicts itself or the spec: {first.message}"
@@ -262,7 +232,7 @@ def _nothing_found(one: Assumed, log: LogEvidence) -> Judgement:
     """Holds where the log would have shown whatever turns the verdict."""
     if one.name in ("timing", "clock"):
         return OF_PLACES
-    figure = _noise_figure(one, log) if one.name == "noise" else _seen(one, log)
+    figure = noise_figure(one, log) if one.name == "noise" else _seen(one, log)
     hidden = list(_hidden(one, log))
     if hidden:
         words = f"this log could hide what turns the verdict: {'; '.join(hidden)}"
@@ -270,7 +240,7 @@ def _nothing_found(one: Assumed, log: LogEvidence) -> Judgement:
     if figure is None:
         return Judgement("not_shown", "this log cannot show it")
     if one.name == "noise":
-        return _noise(one, log, figure)
+        return noise_within(one, log, figure)
     return _shown(one, log, figure)
 
 
@@ -280,6 +250,8 @@ def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
     if moved := shifts(one, log.found):
         figure = widened(figure, moved)
     figure = _with_undone(figure, log.parts.largest_undone(one))
+    size, slight = log.parts.slight(one)
+    figure, alone = _with_undone(figure, size), alone + slight
     least = log.parts.least_s(one)
     if least is None:
         words = f"not found, and this log would have shown what turns the verdict{alone}"
@@ -375,38 +347,3 @@ def _sizes(one: Assumed, log: LogEvidence) -> Iterator[float]:
         units = {p.name: p.unit for p in registry()[shown.effect].parameters}
         if units[shown.parameter] == one.unit and shown.value is not None:
             yield size_of(shown)
-
-
-def _noise_figure(one: Assumed, log: LogEvidence) -> MeasuredFigure | None:
-    """The standard deviation that was found, white and slow together, over the spec's."""
-    key, own = f"{one.stage}/{one.role}", log.split(one)
-    if own is not None:
-        return MeasuredFigure(own.loudest.value, own.loudest.low, own.loudest.high)
-    found = log.found
-    white = found.noise.white_factor.get(key)
-    if white is None:
-        return None
-    slow = found.noise.slow.get(key)
-    share = max(slow.variance_over_spec) if slow is not None else 0.0
-    return MeasuredFigure(math.sqrt(white**2 + share))
-
-
-def _noise(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
-    factor = figure.value or 0.0
-    own = log.split(one)
-    most = max(factor, figure.high or 0.0) if own is None else own.most
-    where = _readings(own)
-    if log.paper.noisier(one.role, one.stage, most):
-        words = (f"up to {to_digits(most, 3)} times the spec's figure is nothing unusual on "
-                 "this log, but turns the verdict")  # fmt: skip
-        return Judgement("not_shown", words, figure)
-    words = f"{to_digits(factor, 3)} times the spec's figure{where}, nothing material beyond it"
-    return Judgement("holds", words, figure)
-
-
-def _readings(own: NoiseFactors | None) -> str:
-    """Which readings a sensor's figure is of, and that of the others: ` in range; 0.98 in ...`."""
-    if own is None or len(own.parts) < 2:
-        return ""
-    others = (f"{to_digits(f.value, 3)} in {' and '.join(f.readings)}" for f in own.parts[1:])
-    return f" in {' and '.join(own.loudest.readings)} ({', '.join(others)})"

@@ -13,6 +13,7 @@ from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.late_together import others_late
 from syncline_design.comparison.on_paper import OnPaper
+from syncline_design.diagnosis.consequence import SHARE
 from syncline_design.diagnosis.result import Smallest
 from syncline_design.diagnosis.stretches import OtherFit, ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
@@ -22,6 +23,7 @@ from syncline_design.model.figure_text import format_duration, rounded, to_digit
 from syncline_design.model.normal import NEARLY_ALL, NORMAL_95
 
 SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show
+_AS_LARGE: Final = "makes a fifth of the spec's noise or more"
 TOLD_S: Final = 1.0  # a short stretch whose size is told beside
 IsOf = Callable[[str, tuple[str, ...], str, Assumed], bool]
 
@@ -50,9 +52,7 @@ class InStretches:
         """What stands out beyond doubt beside what fits as well; all of it turns the verdict."""
         for s in self.found.stands:
             fits: list[Stands | OtherFit] = [s, *_in_its_place(s)]
-            turning = all(
-                self.paper.turned(f.label[0], f.label[1], f.stage, _values(f)) for f in fits
-            )
+            turning = all(self._turns(f) for f in fits) or s.share >= SHARE
             ways = (*(OneWay((of_stretch(fit),)) for fit in fits), *self._together(s))
             if s.sure and len(ways) > 1 and turning:
                 said = f"{of_stretch(s).words} stands out {_placed(s)}"
@@ -67,7 +67,8 @@ class InStretches:
         others = [part for way in self._together(s) for part in way.parts]
         also = any(self.is_of(f.label[0], (f.label[1],), f.stage, one) for f in s.instead)
         also = also or any(self.is_of(p.effect, p.sensors, p.stage, one) for p in others)
-        if not (own or also) or not self.paper.turned(name, sensor, s.stage, _values(s)):
+        turns = self._turns(s)
+        if not (own or also) or not (turns or (s.sure and s.share >= SHARE)):
             return None
         place = _placed(s)
         rivals = _in_its_place(s)
@@ -75,7 +76,8 @@ class InStretches:
         alone = alone and not others
         if own and s.sure and alone:
             part = of_stretch(s)
-            words = f"{part.words} stands out {place}, and would turn the verdict{_built_in(s)}"
+            matters = "would turn the verdict" if turns else _AS_LARGE
+            words = f"{part.words} stands out {place}, and {matters}{_built_in(s)}"
             return Judgement("broken", words, figure_of(one, part.parameters), s.from_s, s.to_s)
         if s.sure:
             words = f"this log cannot tell it from what stands out {place}: {name} ({sensor})"
@@ -84,6 +86,19 @@ class InStretches:
             words = (f"{of_stretch(s).words} seems to stand out {place}: a sound log shows as much "
                      f"anywhere with a chance of {by_chance}; a longer log would tell")  # fmt: skip
         return Judgement("not_shown", words, None, s.from_s, s.to_s)
+
+    def _turns(self, one: Stands | OtherFit) -> bool:
+        return self.paper.turned(one.label[0], one.label[1], one.stage, _values(one))
+
+    def slight(self, one: Assumed) -> tuple[float, str]:
+        """The largest size, and in words, of what stands out of this assumption beyond doubt and
+        neither turns the verdict nor is as large as what matters; 0 and nothing of none."""
+        own = [s for s in self.found.stands if s.sure and s.share < SHARE and not self._turns(s)]
+        own = [s for s in own if self.is_of(s.label[0], (s.label[1],), s.stage, one)]
+        figures = [figure_of(one, of_stretch(s).parameters) for s in own]
+        ends = [end for f in figures if f is not None for end in (f.low, f.value, f.high)]
+        words = [f"; {of_stretch(s).words} stands out {_placed(s)}, and is slight" for s in own]
+        return max((abs(end) for end in ends if end is not None), default=0.0), "".join(words)
 
     def least_s(self, one: Assumed) -> tuple[float, str] | None:
         """The shortest stretch in which what turns the verdict would have shown, and what shows.

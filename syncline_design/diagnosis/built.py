@@ -13,13 +13,16 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.diagnosis.fitting import Model
 from syncline_design.diagnosis.instead import InItsPlace, in_place
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
 from syncline_design.diagnosis.noise_split import NoiseFactors, factors
+from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import SearchedLog, examined, told
 from syncline_design.diagnosis.search import DiagnosisSettings
-from syncline_design.diagnosis.stretches import Stands, Stretches, stretches
+from syncline_design.diagnosis.spans import span_of
+from syncline_design.diagnosis.stretches import Stands, Stretches, left_as_one, stretches
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
 from syncline_design.machine.deadline import in_force
@@ -28,8 +31,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 
 ROUNDS: Final = 3  # of taking out what stands out
-MOST_TAKEN: Final = 0.3  # of the rows
-MARGIN, MARGIN_ROWS = 0.25, 2.0  # of a stretch, and rows, by which its ends may be off
+MOST_TAKEN: Final = 0.6  # of the rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +41,8 @@ class Sighted:
     taken: the stretches that the diagnosis is without.  factors: noise by `stage/sensor`.
     instead: what several departures together explain as well as one that was found.
     beyond: how far speed and turn rate are beyond their limits, by code and stage.
-    ends_s: stamps of the log's first and last row; None: not known.
+    ends_s: stamps of the log's first and last row; None: not known.  course: what is left, where
+    that is one course that begins and ends.  left_out: share of the rows that it is without.
     """
 
     found: Diagnosis
@@ -50,6 +53,13 @@ class Sighted:
     taken: tuple[Stands, ...] = ()
     instead: tuple[InItsPlace, ...] = ()
     ends_s: tuple[float, float] | None = None
+    course: OneCourse | None = None
+    left_out: float = 0.0
+
+    @property
+    def left_in(self) -> tuple[Stands, ...]:
+        """What stands out beyond doubt in what was diagnosed: it was too much to be left out."""
+        return tuple(s for s in self.stretches.stands if s.sure and s not in self.taken)
 
 
 def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> Sighted:
@@ -81,24 +91,36 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             tuple(taken),
             in_place(one.data, model, one.search.signatures),
             inputs.log.ends_s,
+            left_as_one(one.data, model, one.search.signatures),
+            1.0 - len(one.inputs.log) / len(inputs.log),
         )
 
 
 def _seen(one: SearchedLog) -> Stretches:
     in_force().doing("looking at stretches of the log")
-    model = one.result.model
+    model = _built_in_undone(one)
     free = one.search.free_signatures(model)
     return stretches(one.data, model, free, one.search.settings.seed)
+
+
+def _built_in_undone(one: SearchedLog) -> Model:
+    """The model without what is built in and acts in a part of the log, by the search.
+
+    It is one stretch there, and may span two of them and what lies between.
+    """
+    model = one.result.model
+    kept = tuple(a for a in model.acting if span_of(a.effect) is None or a.effect.passing)
+    if len(kept) == len(model.acting):
+        return model
+    return replace(model, acting=kept, error=one.data.error(kept))
 
 
 def _less(inputs: Measured, taken: Sequence[Stands]) -> Measured | None:
     """The log without some stretches; None where that is nothing, or too much of it."""
     time_s = inputs.log.time_s
-    step_s = float(np.median(np.diff(np.unique(time_s)))) if len(time_s) > 1 else 0.0
     inside = np.zeros(len(time_s), bool)
     for one in taken:
-        margin_s = MARGIN_ROWS * step_s + MARGIN * (one.to_s - one.from_s)
-        inside |= (time_s >= one.from_s - margin_s) & (time_s <= one.to_s + margin_s)
+        inside |= (time_s >= one.from_s - one.margin_s) & (time_s <= one.to_s + one.margin_s)
     if not np.any(inside) or np.mean(inside) > MOST_TAKEN:
         return None
     return replace(inputs, log=inputs.log.rows(np.flatnonzero(~inside)), reread=None)

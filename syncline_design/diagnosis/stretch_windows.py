@@ -88,7 +88,7 @@ def scanned(sums: BlockSums, width: int) -> Iterator[Windows]:
     usual = math.inf
     for length in lengths:
         normal, score, square, rows = sums.inside(length)
-        gains, seen = _gains(normal, score, width)
+        gains, seen = squares(normal, score, width)
         own = gains[:, 0]
         shown = float(np.median(own[seen])) / middle if np.any(seen) else 1.0
         drawn = float(np.mean(gains[seen, 1:])) / width if np.any(seen) else 1.0
@@ -153,7 +153,7 @@ def _without_one(sums: BlockSums, length: int, which: NDArray[np.int64], width: 
     for k in range(length if length > 1 else 0):
         at = which + k
         fewer = normal - (sums.normal[at + 1] - sums.normal[at])
-        gains, _ = _gains(fewer, score - (sums.score[at + 1, :1] - sums.score[at, :1]), width)
+        gains, _ = squares(fewer, score - (sums.score[at + 1, :1] - sums.score[at, :1]), width)
         least = np.minimum(least, gains[:, 0])
     return least
 
@@ -170,7 +170,7 @@ def _log_f(share: Array, first: int, second: Array) -> Array:
     return np.where(np.isfinite(found), found, -0.5 * second * np.log1p(first * share / second))
 
 
-def _gains(normal: Array, score: Array, width: int) -> tuple[Array, Array]:
+def squares(normal: Array, score: Array, width: int) -> tuple[Array, Array]:
     """b' M b of every window and log (k, 1 + draws), and whether all parameters are seen in it."""
     diagonal = np.einsum("kpp->kp", normal)
     scale = np.sqrt(np.maximum(diagonal, 1e-300))

@@ -24,6 +24,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, zero_values
+from syncline_design.diagnosis.consequence import expected_rms_m, rms_m
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.fitting import Data, Model, adjusted
 from syncline_design.diagnosis.noise import (
@@ -33,8 +34,10 @@ from syncline_design.diagnosis.noise import (
     precision,
     white_covariance,
 )
+from syncline_design.diagnosis.one_course import OneCourse, one_course
 from syncline_design.diagnosis.scores import clean_errors
 from syncline_design.diagnosis.spans import StampSpan, cut_to, cuttable
+from syncline_design.diagnosis.stretch_ends import ends
 from syncline_design.diagnosis.stretch_windows import (
     ALONE,
     DOUBT,
@@ -58,6 +61,7 @@ STREAM: Final = 23  # key of their draws
 SURE: Final = 1e-4  # chance that a sound log has such a window, below which it acts there
 NEARLY_ALL_PLACES: Final = 0.05  # of the windows show less than is told
 AS_GOOD_NATS: Final = 4.5  # within which candidates of a window are not told apart
+ENDS_ROUNDS: Final = 2  # of fitting it and finding its ends: a window of wrong ends fits less of it
 EDGE: Final = 0.02  # of a log, within which what stands out may go on beyond its end
 ASKED: Final = ("latency", "lever_arm", "mounting")  # kinds of assumptions
 Label = tuple[str, str, int]
@@ -69,7 +73,8 @@ class Stands:
 
     values and spreads by its parameters; log_p: log of the chance that a sound log shows as much
     anywhere; sure: whether that is beyond doubt; instead: what fits there as well.  inside:
-    whether it begins and ends within the log, as what is built in does not.
+    whether it begins and ends within the log, as what is built in does not.  margin_s: by which its
+    ends may be off.  share: RMS that it makes in the log, over what the spec's noise makes.
     """
 
     label: Label
@@ -83,6 +88,8 @@ class Stands:
     sure: bool
     instead: tuple[OtherFit, ...] = ()
     inside: bool = False
+    margin_s: float = 0.0
+    share: float = 0.0
 
     @property
     def others(self) -> tuple[Label, ...]:
@@ -133,6 +140,8 @@ class _Hit:
     to_s: float
     log_p: float
     scale2: float
+    signature: Signature
+    margin_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,10 +166,20 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -
     for s in asked:
         sums = _summed(data, whitened, s)
         windows = list(scanned(sums, s.columns.shape[2]))
-        hits += _hits(sums, windows)
+        hits += _hits(s, sums, windows)
         if s.candidate.effect.breaks in ASKED:
             reaches += _reaches(data, s, sums, windows)
     return Stretches(tuple(_stands(data, model, asked, hits)), tuple(reaches))
+
+
+def left_as_one(data: Data, model: Model, known: Sequence[Signature]) -> OneCourse | None:
+    """Whether what a settled model leaves is one course that begins and ends, of any effect that
+    may act in a part of a log, those that the model holds among them."""
+    asked = [s for s in known if _asked(s)]
+    if not asked or len(data.view) < 4 * LEAST_ROWS:
+        return None
+    whitened = _whitened(data, np.zeros((0, len(data.view), 3)), model)
+    return one_course([(s.candidate.label, _summed(data, whitened, s)) for s in asked])
 
 
 def _asked(s: Signature) -> bool:
@@ -203,7 +222,7 @@ def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> BlockSum
     return BlockSums(normal, score, square, rows, edges, data.view.log.time_s)
 
 
-def _hits(sums: BlockSums, windows: Sequence[Windows]) -> Iterator[_Hit]:
+def _hits(s: Signature, sums: BlockSums, windows: Sequence[Windows]) -> Iterator[_Hit]:
     """The window in which a candidate is clearest, if that is at least a doubt."""
     least = min((float(np.min(one.log_p)) for one in windows), default=0.0)
     if least >= math.log(DOUBT):
@@ -214,7 +233,7 @@ def _hits(sums: BlockSums, windows: Sequence[Windows]) -> Iterator[_Hit]:
     at = int(np.argmin(where))
     first, last = sums.first[at], sums.first[at + best.length] - 1
     times = float(sums.time_s[first]), float(sums.time_s[last])
-    yield _Hit(*times, float(best.log_p[at]), best.scale2)
+    yield _Hit(*times, float(best.log_p[at]), best.scale2, s)
 
 
 def _stands(
@@ -224,6 +243,8 @@ def _stands(
     left = sorted(hits, key=lambda one: one.log_p)
     while left:
         best = left[0]
+        for _ in range(ENDS_ROUNDS):
+            best = _to_the_row(data, model, best)
         named = _named(data, model, asked, best)
         if named is not None:
             yield named
@@ -249,8 +270,41 @@ def _named(data: Data, model: Model, asked: Sequence[Signature], hit: _Hit) -> S
     return Stands(
         own.label, own.stage, hit.from_s, hit.to_s, own.parameters, own.values, own.spreads,
         hit.log_p, hit.log_p < math.log(SURE), others,
-        is_inside(hit.from_s, hit.to_s, data.view.log.ends_s),
+        is_inside(hit.from_s, hit.to_s, data.view.log.ends_s), hit.margin_s,
+        _share(data, model, named, hit),
     )  # fmt: skip
+
+
+def _to_the_row(data: Data, model: Model, hit: _Hit) -> _Hit:
+    """The window with the ends of what acts there, by the candidate that it is clearest in."""
+    found = _fitted(data, model, precision(data.structure, _as_loud(data.structure, model)),
+                    hit.signature, hit)  # fmt: skip
+    if found is None:
+        return hit
+    time_s = data.view.log.time_s
+    made = _made(data, model, found)
+    _, (left, moved) = _whitened(data, made[None], model)
+    told = np.sum(moved**2, axis=1) / max(hit.scale2, 1.0)
+    saved = np.sum(moved * left, axis=1) / max(hit.scale2, 1.0) - 0.5 * told
+    rows = np.flatnonzero((time_s >= hit.from_s) & (time_s <= hit.to_s))
+    own = ends(saved, told, int(rows[0]), int(rows[-1]))
+    first_s, last_s = float(time_s[own.first]), float(time_s[own.last])
+    usual_s = float(np.median(np.diff(np.unique(time_s))))
+    return replace(hit, from_s=first_s, to_s=last_s, margin_s=usual_s * own.margin)
+
+
+def _made(data: Data, model: Model, fit: _Fit) -> Array:
+    """What a candidate would do to every row if it acted there (n, 3) [m]."""
+    one = fit.signature.candidate
+    values = {p.name: v for p, v in zip(one.effect.slopes(), fit.values, strict=True)}
+    whole = Acting(one.effect, one.sensor, one.stage, {**zero_values(one.effect), **values})
+    return data.error(model.acting) - data.error((*model.acting, whole))
+
+
+def _share(data: Data, model: Model, fit: _Fit, hit: _Hit) -> float:
+    inside = (data.view.log.time_s >= hit.from_s) & (data.view.log.time_s <= hit.to_s)
+    made_m = rms_m(data, _made(data, model, fit) * inside[:, None])
+    return made_m / max(expected_rms_m(data), 1e-300)
 
 
 def is_inside(from_s: float, to_s: float, ends_s: tuple[float, float]) -> bool:
