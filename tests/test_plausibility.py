@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
-from syncline_design.spec.load import load, load_text
+from syncline_design.spec import files
+from syncline_design.spec.load import load, load_builtin, load_siblings, load_text
 from syncline_design.verdict.cautions_of_facts import implausible_cautions
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
@@ -158,3 +159,34 @@ def test_what_is_deep_under_water_has_no_air_and_no_satellites(
     found = asked(json.dumps(spec, indent=1), tmp_path)
     assert [key for _, key, _ in found] == [f"stages[0].{key}" for key in keys]
     assert all("at a depth of 300 m" in reason for _, _, reason in found)
+
+
+def test_siblings_are_those_of_the_whole_catalog() -> None:
+    """Of every type there is, from the families that hold one and no others."""
+    whole = load_builtin().sensors
+    types = {(one.modality, one.type) for one in whole.values()}
+    assert len(types) > 15
+    for kind in types:
+        siblings = {k for k, one in whole.items() if (one.modality, one.type) == kind}
+        found = load_siblings({kind}).sensors
+        assert {k for k, one in found.items() if (one.modality, one.type) == kind} == siblings
+        assert all(found[k] == whole[k] for k in siblings)
+
+
+def test_a_sensor_is_held_against_its_type_without_reading_all_families(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of them took a fifth of a second of every command on a system of one's own."""
+    text = Path("examples/hidden_latency.yaml").read_text("utf-8")
+    case = load_text(text, tmp_path / "spec.yaml")
+    read: list[str] = []
+    drawn = files._family
+
+    def noted(shown: str) -> files.Collection:
+        read.append(shown)
+        return drawn(shown)
+
+    monkeypatch.setattr(files, "_family", noted)
+    list(implausible_cautions(case))
+    assert 0 < len(read) < 10
+    assert all(name.startswith("builtin:sensors/") for name in read)

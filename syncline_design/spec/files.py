@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import field
 from importlib.resources import files
 from pathlib import Path
@@ -103,6 +103,11 @@ class Collection:
             self.problems.extend(family.problems)
             self.digests.extend(family.digests)
             self.unread = {key: one for key, one in self.unread.items() if one.file != shown}
+
+    def draw_types(self, types: Container[tuple[str, str]]) -> None:
+        """Read the shipped families that hold a sensor of one of these modalities and types."""
+        self.note_families()
+        self.draw([key for key, one in self.unread.items() if (one.modality, one.type) in types])
 
     def draw_all(self) -> None:
         """Read every shipped family."""

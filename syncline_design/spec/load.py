@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -98,6 +99,15 @@ def load_document(document: ParsedFile, path: Path, collection: Collection) -> C
 def load_builtin(families: bool = True) -> Catalog:
     """The shipped catalogs alone; without families, those that hold the paper's entries."""
     collection = builtin_collection(families)
+    _stop_at(collection.problems)
+    return collection.catalog()
+
+
+def load_siblings(types: Container[tuple[str, str]]) -> Catalog:
+    """The shipped catalogs as far as they may hold sensors of these modalities and types."""
+    collection = Collection()
+    add_builtin(collection)
+    collection.draw_types(types)
     _stop_at(collection.problems)
     return collection.catalog()
 

@@ -20,7 +20,7 @@ from syncline_design.spec.case import CandidateEntry, Case, StageCase
 from syncline_design.spec.catalog import PlatformEntry, SensorEntry
 from syncline_design.spec.catalog_check import FACTOR, FEWEST_SIBLINGS, size_of
 from syncline_design.spec.facts import SIGMA_DIMENSIONS
-from syncline_design.spec.load import load_builtin
+from syncline_design.spec.load import load_siblings
 
 LONG_ARM: Final = 3.0  # times the largest lever arm that the platform says it has
 MAST_M: Final = 5.0  # from so deep a mast or a float may still reach the air
@@ -51,7 +51,8 @@ def implausible(
         yield from _arms(stage)
         yield from _under_water(stage)
     own = {one.id: one.entry for one in sensors if not one.origin.startswith(SHIPPED)}
-    shipped = tuple(load_builtin().sensors.values()) if any(e.type for e in own.values()) else ()
+    types = {(one.modality, one.type) for one in own.values() if one.type}
+    shipped = tuple(load_siblings(types).sensors.values()) if types else ()
     for name, entry in own.items():
         yield from _noise(name, entry, shipped)
 
