@@ -152,8 +152,8 @@ class Precision:
     def own_blocks(self) -> Array:
         """Inverses (k, m, m) of L_ii L_ii', L_ii the factor's triangle of one stamp."""
         m = self.loading.shape[2]
-        bands = self.factor.T.reshape(-1, m, m + 1)
-        inverse = lower_inverse(np.ascontiguousarray(np.moveaxis(bands, 2, 0)))
+        bands = np.ascontiguousarray(self.factor.reshape(m + 1, -1, m).swapaxes(1, 2))
+        inverse = lower_inverse(bands)
         own: Array = np.swapaxes(inverse, 1, 2) @ inverse
         return own
 
@@ -211,14 +211,14 @@ def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array
 
 
 def lower_inverse(bands: Array) -> Array:
-    """Inverses (n, m, m) of the lower triangles (n, m, m) in bands (>= m, n, m), row by row."""
-    n, m = bands.shape[1:]
+    """Inverses (n, m, m) of the lower triangles (n, m, m) in bands (>= m, m, n), row by row."""
+    m, n = bands.shape[1:]
     found = np.zeros((m, m, n))
-    for a in range(m):
-        before = np.array([bands[a - b, :, b] for b in range(a)]).reshape(a, n)
-        found[a] = -np.einsum("bn,bcn->cn", before, found[:a])
-        found[a, a] += 1.0
-        found[a] /= bands[0, :, a]
+    for a, row in enumerate(found):
+        for b in range(a):
+            row[: b + 1] -= bands[a - b, b] * found[b, : b + 1]
+        row[a] = 1.0
+        row[: a + 1] /= bands[0, a]
     return np.ascontiguousarray(np.moveaxis(found, 2, 0))
 
 

@@ -68,7 +68,12 @@ def data_of(view: Scene, structure: Structure) -> Data:
 
 
 def _in_time(structure: Structure, index: NDArray[np.int64]) -> Structure:
-    """The structure that noise is fitted with: what the survey's errors leave."""
+    """The structure that noise is fitted with: what the survey's errors leave.
+
+    The same one where that is all of it: what is factored for the one then serves the other.
+    """
+    if structure.survey is None and len(index) == len(structure.time_s):
+        return structure
     return replace(structure.rows(index), survey=None)
 
 

@@ -16,7 +16,6 @@ from syncline_design.diagnosis.noise import (
     Bounds,
     NoiseLevel,
     Structure,
-    loadings,
     precision,
 )
 from syncline_design.diagnosis.noise_slopes import Slopes, noise_slopes, summed_over
@@ -87,8 +86,8 @@ class Packing:
 
     def slopes_at(self, level: NoiseLevel, known: Precision, error: Array) -> Slopes:
         """Slopes of the NLL by what the covariance is made of."""
-        _, times = loadings(self.structure, level)
-        fresh = np.zeros(known.loading.shape[2] - times.shape[0])
+        times = [t for own in level.time_constant_s for t in own]
+        fresh = np.zeros(known.loading.shape[2] - len(times))
         return noise_slopes(known, error, self.structure.time_s, np.concatenate([times, fresh]))
 
     def slopes(self, level: NoiseLevel, found: Slopes) -> Array:
