@@ -108,3 +108,30 @@ def test_breaks_in_a_beat_that_take_little_of_the_time_are_gaps() -> None:
     true = np.arange(0.0, 120.0, 0.02)
     one, _ = audited(true[(true % 15.0 < 14.0) | (true % 15.0 > 14.7)], np.random.default_rng(4))
     assert [f.fault for f in one.faults] == ["gap"] * 8
+
+
+@pytest.mark.parametrize(
+    ("on_s", "off_s", "length_s"), [(60.0, 60.0, 600.0), (10.0, 20.0, 90.0), (30.0, 10.0, 130.0)]
+)
+def test_equal_silences_of_one_cycle_are_how_messages_come(
+    on_s: float, off_s: float, length_s: float
+) -> None:
+    rng = np.random.default_rng(7)
+    true = 0.013 + np.arange(int(20.0 * length_s)) / 20.0
+    sound(*audited(true[np.mod(true, on_s + off_s) < on_s], rng))
+
+
+@pytest.mark.parametrize(
+    "silences",
+    [
+        [(20.0, 100.0)],  # one, of more than half of the log
+        [(20.0, 40.0), (60.0, 80.3)],  # two of no one length
+        [(60.0, 80.0), (90.0, 110.0)],  # two of one length, longer apart from the ends
+    ],
+)
+def test_silences_of_no_cycle_are_gaps(silences: list[tuple[float, float]]) -> None:
+    rng = np.random.default_rng(8)
+    true = 0.013 + np.arange(3000) / 20.0
+    kept = np.all([(true < begin) | (true > end) for begin, end in silences], axis=0)
+    one, _ = audited(true[kept], rng)
+    assert [f.fault for f in one.faults] == ["gap"] * len(silences)

@@ -73,3 +73,49 @@ def test_a_stale_message_of_a_slow_sensor_is_a_repeated_one() -> None:
     off[30] = -1.0
     one = audited(true, late, off)
     assert [f.fault for f in one.faults] == ["duplicates"]
+
+
+@pytest.mark.parametrize("off_s", [1.0, -1.0, 2.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_messages_of_events_a_second_off_are_slips(off_s: float, seed: int) -> None:
+    """Events 0.43 s apart in the mean, of which one that is off comes after a later stamp, and one
+    among events that are farther apart than it is off."""
+    rng = np.random.default_rng(seed)
+    apart = rng.exponential(0.43, 170)
+    apart[80:83] = 2.5
+    apart[119:122] = 0.2
+    true = 0.013 + np.cumsum(apart)
+    off = np.zeros(true.size)
+    off[[81, 120]] = off_s
+    one = audited(
+        true, np.maximum.accumulate(true + 2e-3 + rng.gamma(2.0, 1.5e-3, 170)) - true, off
+    )
+    assert [f.fault for f in one.faults] == ["whole_second_slip"]
+    assert one.faults[0].parameters == {"seconds": off_s, "count": 2.0}
+    assert one.residual.bound is not None
+    assert one.residual.bound < 0.03
+
+
+def test_events_that_transport_held_up_are_no_slips() -> None:
+    """By 1.00 s, and those behind them as well."""
+    rng = np.random.default_rng(5)
+    true = 0.013 + np.cumsum(rng.exponential(0.1, 400))
+    late = 2e-3 + rng.gamma(2.0, 1.5e-3, true.size)
+    late[[100, 250]] += 1.0
+    late = np.maximum.accumulate(true + late) - true
+    assert audited(true, late, np.zeros(true.size)).faults == ()
+
+
+@pytest.mark.parametrize("range_s", [None, 65.536])
+def test_events_within_one_tick_of_their_clock_are_no_duplicates(range_s: float | None) -> None:
+    """Ticks of 1 ms, in a counter of 16 bits or not: some of 1500 events share one by chance."""
+    rng = np.random.default_rng(0)
+    true = np.cumsum(rng.exponential(0.05, 1500))
+    stamp = np.floor((true if range_s is None else np.mod(true + 3.3, range_s)) * 1e3) / 1e3
+    assert 10 < int(np.sum(np.diff(stamp) == 0.0)) < 30
+    base = START if range_s is None else 0
+    whole = base + np.round(stamp * 1e9).astype(np.int64)
+    came = np.maximum.accumulate(true + 2e-3 + rng.gamma(2.0, 1.5e-3, true.size))
+    receive = START + np.round(came * 1e9).astype(np.int64)
+    one = examined(Stream("x", (), true.size, Stamps("header.stamp", "log time", whole, receive)))
+    assert "duplicates" not in {f.fault for f in one.faults}

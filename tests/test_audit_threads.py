@@ -49,6 +49,54 @@ def test_packets_are_named_whatever_order_their_messages_were_noted_in(
     assert one.residual.bound == pytest.approx(np.ptp(noted - true), rel=0.1)
 
 
+@pytest.mark.parametrize("rate_hz", [200.0, 250.0, 333.0])
+def test_packets_whose_messages_are_read_one_after_the_other_are_packets_and_no_more(
+    rate_hz: float,
+) -> None:
+    """30 us apart, noted up to 1 ms later: every fourth keeps a rhythm, which is the packets'."""
+    rng = np.random.default_rng(6)
+    true, _ = in_packets(rate_hz, rng)
+    tick = np.ceil((true + 4.3e-3) / 0.016)
+    _, first, inverse = np.unique(tick, return_index=True, return_inverse=True)
+    stamp = 0.016 * tick + (rng.gamma(2.0, 2e-5, first.size))[inverse]
+    stamp += 3e-5 * (np.arange(true.size) - first[inverse])
+    noted = stamp + 2e-4 + rng.uniform(0.0, 1e-3, true.size)
+    one = audited(stamp, noted)
+    assert named(one) == ["packetised"]
+    assert one.residual.bound == pytest.approx(np.ptp(noted - true), rel=0.15)
+
+
+@pytest.mark.parametrize("rate_hz", [20.0, 47.3, 125.0, 200.0, 333.0, 400.0])
+def test_frames_of_usb_that_threads_noted_are_no_steps_and_no_drift(rate_hz: float) -> None:
+    """Receipts scatter over a frame of 1 ms, so stamps on arrival are not named, but their frames
+    are said and counted; the sensor's clock moves over two frames."""
+    rng = np.random.default_rng(7)
+    true = 3e-4 + np.arange(int(75.0 * rate_hz)) / rate_hz * (1.0 + 3e-5)
+    stamp = np.ceil(true / 1e-3) * 1e-3 + 1e-4 + rng.gamma(2.0, 2e-5, true.size)
+    noted = stamp + 2e-4 + rng.uniform(0.0, 1e-3, true.size)
+    one = audited(stamp, noted)
+    assert named(one) == []
+    assert one.hidden is not None
+    assert one.residual.bound is not None
+    assert one.residual.bound + one.hidden.seconds > 0.9 * np.ptp(noted - true)
+
+
+@pytest.mark.parametrize(("rate_hz", "timer_s"), [(62.5, 0.016), (125.0, 0.008)])
+def test_a_tick_left_out_by_a_sensor_of_a_tick_is_said_and_no_loss(
+    rate_hz: float, timer_s: float
+) -> None:
+    """30 ppm slower than the timer: once a tick comes before the message that it was for."""
+    rng = np.random.default_rng(8)
+    true = np.arange(int(75.0 * rate_hz)) / rate_hz * (1.0 + 3e-5) - 1e-3
+    stamp = np.ceil(true / timer_s) * timer_s + 1e-4 + rng.gamma(2.0, 2e-5, true.size)
+    one = audited(stamp, stamp + 1e-4 + rng.gamma(2.0, 8e-5, true.size))
+    assert np.sum(np.diff(stamp) > 1.5 * timer_s) == 1
+    assert named(one) == []
+    assert one.hidden is not None
+    assert one.hidden.seconds == timer_s
+    assert "left 1 of them empty" in one.hidden.words
+
+
 def test_wrong_stamps_among_packets_that_threads_noted_stay_wrong() -> None:
     rng = np.random.default_rng(2)
     true, stamp = in_packets(200.0, rng)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.auditing.cadence import Cadence, about_rhythm, without_losses
-from syncline_design.auditing.frames import FULL_SPEED_S, Framed, framed
+from syncline_design.auditing.frames import FRAMES_S, FULL_SPEED_S, Framed, framed
 from syncline_design.auditing.late_scatter import Waits, waits_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Mask, Series, in_words, seconds, spread
@@ -23,6 +24,8 @@ _PART: Final = 100  # messages of a part of the log
 _LEAST_PARTS, _MOST_PARTS = 4, 12
 _EVENER: Final = 0.3  # how much more even stamps of the sensor's own are
 _WHOLE_SCANS: Final = 1.25  # how far from its stamp a point of a scan may lie, in scans
+_ONE_TICK: Final = 0.9  # of an interval
+_CLOCKS: Final = 1e-4  # that a sensor's clock and a timer's differ by
 _SKEWED: Final = 0.2  # how much further the late half of the rhythm's scatter reaches
 
 
@@ -126,6 +129,16 @@ def hidden_in(series: Series, pace: Cadence) -> Hidden | None:
                   "that is triggered so")  # fmt: skip
 
 
+def frame_of(series: Series) -> float:
+    """The frames of USB that stamps lie on [s], 0 of none: where a sensor's clock drifts over a
+    frame's edge its stamps move by one, as in no step of a clock."""
+    places = series.places()
+    if series.receive is None or places.size < 2:
+        return 0.0
+    found = framed(seconds(series.stamp[places] - series.stamp[places[0]]))
+    return found.frame_s if found is not None and found.frame_s <= max(FRAMES_S) else 0.0
+
+
 def _hidden_frame(found: Framed) -> Hidden:
     frame = in_words(found.frame_s)
     late = f"{in_words(found.noise_s)} late"
@@ -137,6 +150,22 @@ def _hidden_frame(found: Framed) -> Hidden:
            if found.varied else "its interval is a whole number of them")  # fmt: skip
     return Hidden(found.frame_s, f"whether it was stamped on arrival over USB: its stamps lie on "
                   f"frames of {frame}, {late}, {why}")  # fmt: skip
+
+
+def but_for_left_out(
+    found: list[StampFault], hidden: Hidden | None, pace: Cadence
+) -> tuple[list[StampFault], Hidden | None]:
+    """Without losses that are as few as the ticks which a sensor leaves out that measures a little
+    less often than the timer that may hide here; said instead."""
+    lost = [f for f in found if f.fault == "lost_messages"]
+    if hidden is None or not lost or hidden.seconds < _ONE_TICK * pace.period_s:
+        return found, hidden
+    apart = 1.0 + _CLOCKS * float(pace.interval.sum()) / hidden.seconds
+    count = float(lost[0].parameters["count"])
+    if count > apart:
+        return found, hidden
+    words = f"{hidden.words}; and whether what left {round(count)} of them empty was a lost message"
+    return [f for f in found if f is not lost[0]], replace(hidden, words=words)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

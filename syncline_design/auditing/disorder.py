@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.measured_order import sequence_of
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Mask, Series
+from syncline_design.auditing.series import NS, Mask, Series, seconds
 from syncline_design.auditing.unrhythmic_order import order_without_rhythm
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
@@ -29,6 +29,9 @@ _MOST_PAIRED: Final = 0.6  # of all messages
 _EARLY: Final = 0.2  # of an interval before the fastest message near by
 _MOST_EARLY: Final = 0.3  # of the pairs
 _BESIDE: Final = 15  # messages on each side
+_TOGETHER: Final = 0.1  # of the mean interval
+_BUNCHED: Final = 0.25  # share of messages that come together
+_READ_S: Final = 4e-4  # that reading a message of a packet hardly takes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +71,10 @@ def disorder_of(series: Series) -> Disorder:
     exchanged."""
     places = series.places()
     falls = np.flatnonzero(np.diff(series.stamp[places]) < 0)
+    if falls.size and _in_packets(series.stamp[places]):
+        packets = _without_rhythm(series)
+        if packets.order is not None:
+            return packets
     sequence = sequence_of(series) if falls.size else None
     if sequence is None or series.receive is None:
         return _without_rhythm(series) if falls.size else Disorder()
@@ -90,6 +97,14 @@ def disorder_of(series: Series) -> Disorder:
     return Disorder(
         alone, None, _fault(series, places[falls + 1], count, deepest), count, deepest
     )  # fmt: skip
+
+
+def _in_packets(stamp: NDArray[np.int64]) -> bool:
+    """Whether many stamps, in their order, follow one another as messages of a packet are read:
+    every so many of them keep a rhythm as well, which is the packets'."""
+    apart = seconds(np.diff(stamp[np.argsort(stamp)]))
+    near = apart < _TOGETHER * float(apart.mean())
+    return float(near.mean()) > _BUNCHED and float(np.median(apart[near])) < _READ_S
 
 
 def _without_rhythm(series: Series) -> Disorder:

@@ -2,7 +2,8 @@
 
 Such a message comes among its neighbours and is stamped among others: put back by whole seconds
 its stamp takes the place of the rhythm between its neighbours that is empty.  One that was held up
-by transport would fall onto a place that another message took.
+by transport would fall onto a place that another message took.  Without a rhythm it is the order of
+messages that tells.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from syncline_design.auditing.cadence import cadence
 from syncline_design.auditing.order import LEAST_SLIP, Repaired
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import Array, Mask, Series, seconds, spread
@@ -46,7 +48,10 @@ def without_lone_slips(series: Series) -> Repaired:
     off = (turns != 0.0) & _lone(turns != 0.0)
     if not 0 < int(off.sum()) <= _MOST * places.size:
         return Repaired(series)
-    off &= _fills_its_place(series.stamp[places], turns, off)
+    placed = _fills_its_place(series.stamp[places], turns, off)
+    if not cadence(series).regular:
+        placed |= _out_of_order(series.stamp[places], turns, off)
+    off &= placed
     off &= _returns(off)
     others = _lone((turns == 0.0) & (np.abs(away) > _STRAY_S))
     if int(off.sum()) <= _CHANCE * int(others.sum()):
@@ -101,6 +106,17 @@ def _fills_its_place(stamp: NDArray[np.int64], turns: Array, off: Mask) -> Mask:
     placed = np.concatenate([[True], fits]) & np.concatenate([fits, [True]])
     stale = np.concatenate([[False], np.diff(stamp) == 0]) & (turns > 0.0)
     return np.asarray(placed & ~stale)
+
+
+def _out_of_order(stamp: NDArray[np.int64], turns: Array, off: Mask) -> Mask:
+    """Of sensors without rhythm: those that put back bring all stamps in order, and others by as
+    much.  A message that transport held up by a second would have held up those behind it."""
+    back = stamp + np.where(off, np.round(turns), 0.0).astype(np.int64) * 10**9
+    if np.any(np.diff(back) <= 0):
+        return np.zeros(off.size, bool)
+    before = np.concatenate([[False], np.diff(stamp) < 0]) & (turns > 0.0)
+    after = np.concatenate([np.diff(stamp) < 0, [False]]) & (turns < 0.0)
+    return np.asarray(np.isin(turns, turns[off & (before | after)]) & off)
 
 
 def _returns(off: Mask) -> Mask:

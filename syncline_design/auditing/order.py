@@ -19,6 +19,7 @@ WEEK_NS: Final = 604_800 * 10**9
 LONGEST_SPIKE: Final = 5  # messages that go back and return
 LEAST_SLIP: Final = 3  # messages
 MOST_SPIKES: Final = 100_000
+_RESOLUTIONS: Final = tuple(10**k for k in range(8))  # ns, to 10 ms
 _SHARED: Final = 2.0  # messages of one count, and one more: no count is shared
 
 
@@ -111,7 +112,7 @@ def _by_chance(stamp: NDArray[np.int64]) -> float:
     low, high = np.percentile(change, [25.0, 75.0])
     if mean <= 0.0 or float(high - low) < 0.3 * mean:
         return 0.0
-    step = max((s for s in (1, 10, 100, 1000, 10_000) if not np.any(stamp % s)), default=1)
+    step = max((s for s in _RESOLUTIONS if not np.any(stamp % s)), default=1)
     return 3.0 + 5.0 * stamp.size * step / mean if step > 1 else 0.0
 
 

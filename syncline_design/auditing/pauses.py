@@ -1,8 +1,8 @@
 """Silence that belongs to how a sensor measures: bursts, duty cycles, and what only events set off.
 
 A link that breaks, or a driver that hangs, does so now and then and for any length of time.  A
-sensor that is switched on and off is silent again and again, after as many messages each time, or
-for most of the log.
+sensor that is switched on and off is silent again and again, after as many messages each time and
+for as long, or for most of the log.  One silence alone is a gap, however long.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from syncline_design.auditing.series import Array, spread
 from syncline_design.machine.quick_dataclass import dataclass
 
 LONG_GAP: Final = 4  # missing in a row; fewer may be single losses
 _LEAST: Final = 6  # pauses
-_LEAST_OF_CYCLE: Final = 3  # pauses of one length after one time, for most of the log
+_LEAST_OF_CYCLE: Final = 2  # pauses of one length after one time
+_LONG: Final = 20.0  # intervals; two shorter ones may be as long by chance
 _LITTLE: Final = 0.2  # of a log's time: less silence is no cycle
 _MOST: Final = 0.5  # of a log's time: more silence is how messages come
 _ALIKE: Final = 0.15  # how much bursts of one kind differ
@@ -44,19 +44,24 @@ def pauses_of(interval: Array, steps: Array, period_s: float) -> Pauses | None:
     """
     places = np.flatnonzero(steps > LONG_GAP)
     share = float(interval[places].sum()) / max(float(interval.sum()), 1e-12)
-    if not _recur(places, interval[places], share, period_s):
+    bursts = np.diff(places, prepend=-1, append=interval.size).astype(np.float64)
+    if share < _LITTLE or not _recur(bursts, interval[places], share, period_s):
         return None
     off = float(np.median(np.abs(interval - steps * period_s)[places]))
     return Pauses(int(places.size), share, off > _OFF_RHYTHM * period_s)
 
 
-def _recur(places: NDArray[np.intp], silent_s: Array, share: float, period_s: float) -> bool:
-    """Whether pauses are how messages come."""
-    if places.size < _LEAST_OF_CYCLE or share < _LITTLE:
+def _recur(bursts: Array, silent_s: Array, share: float, period_s: float) -> bool:
+    """Whether pauses are how messages come; bursts: messages before, between and after them, the
+    first and the last of which the log may have cut."""
+    between = bursts[1:-1]
+    if silent_s.size >= _LEAST:
+        alike = spread(between) <= max(_COUNTS, _ALIKE * float(np.median(between)))
+        return alike or share > _MOST
+    if silent_s.size < _LEAST_OF_CYCLE:
         return False
-    bursts = np.diff(places).astype(np.float64)
-    bursts_alike = spread(bursts) <= max(_COUNTS, _ALIKE * float(np.median(bursts)))
-    if places.size < _LEAST:
-        alike = float(np.ptp(bursts)) <= _COUNTS and float(np.ptp(silent_s)) <= _COUNTS * period_s
-        return alike and share > _MOST
-    return bursts_alike or share > _MOST
+    if silent_s.size == _LEAST_OF_CYCLE and float(silent_s.min()) < _LONG * period_s:
+        return False
+    silent_alike = float(np.ptp(silent_s)) <= _COUNTS * period_s
+    cut = float(max(bursts[0], bursts[-1])) <= float(between.min()) + _COUNTS
+    return silent_alike and cut and float(np.ptp(between)) <= _COUNTS

@@ -131,7 +131,8 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         slips, base = as_epochs(slips, series, epoch)
         found = [f for f in found if f is not epoch]
         known = known_offset(base, slips.series, False)
-    least = max(_coarse(raw), step_ns / NS, grain.size_s if grain is not None else 0.0)
+    known_s = grain.size_s if grain is not None else arrival.frame_of(slips.series)
+    least = max(_coarse(raw), step_ns / NS, known_s)
     moved = _but_for_turns(without_shifts(slips.series, least_s=least), found, told)
     if grain is not None and not any(f.fault == "drift" for f in moved.faults):
         names = {f.fault for f in found}
@@ -146,8 +147,9 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     found = _with_jumps(found, [*slips.faults, *moved.faults], pace.period_s)
     _last(series, pace, stream, known, grain, found)
     found = [f for f in found if not _at_edges(f, disorder)]
-    one = _summed(stream, (raw, continuous, series), pace, found, (slips, moved), known)
     hidden = None if _late_or_coarse(found) else arrival.hidden_in(series, pace)
+    found, hidden = arrival.but_for_left_out(found, hidden, pace)
+    one = _summed(stream, (raw, continuous, series), pace, found, (slips, moved), known)
     return replace(one, overtaken=disorder, copied=_copied(one), hidden=hidden)
 
 
