@@ -411,11 +411,18 @@ def test_what_a_bar_says_shows_under_the_pointer_and_by_keys(browser: Any, repor
         for _ in syncline.ledger:
             page.keyboard.press("ArrowRight")
             said.append(page.inner_text(tip))
+        assert page.locator("#requirements svg .here").count() == 0  # or all marks are painted anew
+        ring, frame = page.locator("#requirements .here").bounding_box(), drawing.bounding_box()
+        assert ring is not None
+        assert frame is not None
+        assert page.locator(tip).count() == 1
+        for at, size in (("x", "width"), ("y", "height")):
+            assert frame[at] <= ring[at] < ring[at] + ring[size] <= frame[at] + frame[size] + 2
         largest = max(syncline.ledger, key=lambda term: term.value_m)
         in_limit_unit = f"{largest.value_m:.4g} m"  # the accuracy limit is written in metres
         assert sum(in_limit_unit in text.replace("\u00a0", " ") for text in said) == 1
         page.keyboard.press("Escape")
-        assert page.locator(tip).count() == 0
+        assert page.locator(f"{tip}, #requirements .here").count() == 0
         box = drawing.bounding_box()
         assert box is not None
         page.mouse.move(box["x"] + 0.42 * box["width"], box["y"] + 0.88 * box["height"])

@@ -42,6 +42,7 @@ from syncline_design.report.render_markdown import markdown
 from syncline_design.report.text import visible
 from syncline_design.report.words import effect_words
 from syncline_design.simulation import SimulationSettings, simulate
+from syncline_design.simulation.comparison import CAUSES
 from syncline_design.verdict.tree import decided
 from tests.simulation_systems import fixed_wing
 
@@ -152,8 +153,14 @@ def test_simulation_tells_ratio_reason_and_certificate() -> None:
     assert (page.unbalanced, len(page.scripts)) == ([], 1)
     ratios = [row.ratio for row in result.grid]
     assert f"{100 * min(ratios):.4g}\u00a0%" in page.text
-    for row in result.grid:
-        assert row.reason in page.text
+    said = [cause for row in result.grid for cause in row.causes]
+    assert said
+    for row in result.grid:  # the share of each cause beside its name, `tilt (up to 1.2 %)`
+        for cause, share in zip(row.causes, re.findall(r"\(([^()]*%)\)", row.reason), strict=True):
+            assert f"{cause.replace('_', ' ')} ({numbers.unbroken(share)})" in page.text
+    fold = page.text[page.text.index("Worst case and Syncline at every") :]
+    for cause in set(said):
+        assert fold.count(CAUSES[cause]) == 1
     found = result.monte_carlo
     for words in (
         "a turn moves the object along a chord", "nothing exceeds the bound", "specs/uav.yaml",

@@ -80,7 +80,7 @@
   open();
 
   // Figures: what a point or a bar says shows under the pointer, and by arrow keys.
-  var SVG = "http://www.w3.org/2000/svg";
+  var SVG = "http://www.w3.org/2000/svg", MANY = 1000;
 
   function span(text, bold) {
     var piece = document.createElement(bold ? "b" : "span");
@@ -101,20 +101,25 @@
       shown = -1;
     }
 
-    function show(index) {
-      if (index === shown) { return; }
-      hide();
-      shown = index;
-      var row = rows[index], scale = svg.clientWidth / size.width || drawing.clientWidth / size.width;
-      ring = document.createElementNS(SVG, "rect");
-      var room = row[2] || row[3] ? 1.5 : 5.5;
-      [["x", row[0] - room], ["y", row[1] - room], ["width", row[2] + 2 * room], ["height", row[3] + 2 * room],
-        ["rx", row[2] || row[3] ? 1 : room], ["class", "here"]].forEach(function (pair) { ring.setAttribute(pair[0], pair[1]); });
-      svg.appendChild(ring);
+    // The ring stands above the figure, not in it: thousands of marks need not be painted again.
+    function place() {
+      ring = document.createElement("div");
+      ring.className = "here";
       tip = document.createElement("div");
       tip.className = "tip";
       tip.setAttribute("role", "status");
-      drawing.appendChild(tip);
+      drawing.append(ring, tip);
+    }
+
+    function show(index) {
+      if (index === shown) { return; }
+      if (!tip) { place(); }
+      shown = index;
+      var row = rows[index], scale = svg.clientWidth / size.width || drawing.clientWidth / size.width;
+      var room = row[2] || row[3] ? 1.5 : 5.5;
+      [["left", row[0] - room], ["top", row[1] - room], ["width", row[2] + 2 * room], ["height", row[3] + 2 * room],
+        ["borderRadius", row[2] || row[3] ? 1 : room]].forEach(function (pair) { ring.style[pair[0]] = pair[1] * scale + "px"; });
+      tip.replaceChildren();
       data.labels.forEach(function (label, k) {
         var value = data.words[row[4 + k]];
         if (value === "") { return; }
@@ -122,6 +127,7 @@
         line.append(span(label + " ", false), span(value, true));
         tip.appendChild(line);
       });
+      tip.style.left = tip.style.top = "0";  // where it is as wide as it can be, to be measured
       var x = (row[0] + Math.min(row[2], size.width / 2)) * scale, y = row[1] * scale;
       var left = Math.max(0, Math.min(x + 10, drawing.clientWidth - tip.offsetWidth));
       var top = y - tip.offsetHeight - 10;
@@ -160,6 +166,7 @@
       show(order[next]);
     }
 
+    if (rows.length > MANY) { svg.style.willChange = "transform"; }  // painted once, on a layer of its own
     drawing.tabIndex = 0;
     drawing.setAttribute("role", "group");
     drawing.setAttribute("aria-label", (svg.querySelector("title") || svg).textContent + ": arrow keys go through its " + rows.length + " points");
@@ -186,7 +193,6 @@
   // A copy that stands alone: colours of the theme that is shown, sizes and a ground of its own.
   function alone(svg) {
     var copy = svg.cloneNode(true), theme = getComputedStyle(document.documentElement), box = svg.viewBox.baseVal;
-    copy.querySelectorAll(".here").forEach(function (ring) { ring.remove(); });
     copy.querySelectorAll("[style]").forEach(function (part) {
       part.setAttribute("style", part.getAttribute("style")
         .replace(/calc\((\d+(?:\.\d+)?px)[^)]*\)\)/g, "$1")
