@@ -31,6 +31,7 @@ from syncline_design.comparison.judgement import OF_PLACES, Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.comparison.shapes import beside_shapes, shapes
+from syncline_design.comparison.whole_delay import delaying, with_all_delays
 from syncline_design.diagnosis.result import Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.sentences import or_rivals
@@ -68,9 +69,11 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
         said = _but_for(said, undone, log.parts.room_undone(one), _is_signed(one))
         if one.name == "noise":
             return said
+        said = _in_all(one, said, log) or said
         return beside_shapes(one, _or_more(one, said, log), log, signed=_is_signed(one))
     moved = [each for each in shifts(one, log.found) if log.is_sure(one, each.finding)]
     shifted = by_shifts(one, moved, log.paper)
+    shifted = _in_all(one, shifted, log)
     if shifted is not None and shifted.status == "broken":
         return beside_shapes(one, shifted, log, signed=_is_signed(one))
     if suspect is not None:
@@ -86,6 +89,12 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     if own:
         return _immaterial(one, own, log.paper)
     return _nothing_found(one, log)
+
+
+def _in_all(one: Assumed, said: Judgement | None, log: LogEvidence) -> Judgement | None:
+    """What is said of a delay, with what adds to it, as far as all of that is sure."""
+    sure = all(log.is_sure(one, f) for f in delaying(one, log.found))
+    return with_all_delays(one, said, log.found, log.paper) if sure else said
 
 
 def _suspect(one: Assumed, log: LogEvidence) -> Judgement | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import field
 from functools import cached_property
 from typing import Final
@@ -22,6 +22,7 @@ from syncline_design.comparison.departing import (
 )
 from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.comparison.late_together import others_late
+from syncline_design.comparison.noise_as_turn import either
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.noise_split import NoiseFactors
@@ -77,7 +78,15 @@ class LogEvidence:
         """What it shows beyond doubt, and explains in several ways."""
         causes = (f for f in self.found.findings if f.material and f.kind == "cause")
         told = [each for f in causes if (each := self._several(f)) is not None]
-        return (*told, *self.parts.in_doubt())
+        return (*told, *self.parts.in_doubt(), *self._noise_in_doubt())
+
+    def _noise_in_doubt(self) -> Iterator[InDoubt]:
+        """Noise of an attitude that bearings would make as well."""
+        known = {} if self.sight is None else self.sight.factors
+        for f in self.found.findings:
+            both = either(f, known) if f.material and f.kind == "noise" else None
+            if both is not None:
+                yield InDoubt(f.sentence, tuple(OneWay((one,)) for one in both), finding=f)
 
     def _several(self, finding: Finding) -> InDoubt | None:
         """A finding with all that would do in its place; None where nothing does."""
