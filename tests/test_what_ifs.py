@@ -12,11 +12,14 @@ import numpy as np
 import pytest
 
 from random_problems import random_problem, with_random_limits
+from syncline_design.choice import platform_fixes as fixes_of_platforms
 from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
 from syncline_design.choice.enumerate import all_designs, best_by_enumeration
 from syncline_design.choice.evaluate import broken
 from syncline_design.choice.outcome import Choice, Deadline
+from syncline_design.choice.parts import Existence, is_feasible
+from syncline_design.choice.platform_fixes import platform_fixes
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.slack import payload
 from syncline_design.choice.tolerance import measure_next
@@ -147,6 +150,44 @@ def test_a_platform_that_moves_otherwise(small, figure, share: float) -> None:
             np.testing.assert_allclose(
                 getattr(one.options, column), [_exact(o, column) for o in other.options], rtol=1e-14
             )
+
+
+@pytest.mark.parametrize(("accuracy_m", "sync"), [(0.02, 1e-4), (0.35, 1e-6), (0.02, 1.0)])
+def test_changes_of_a_platform_that_help_are_those_of_tables_built_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accuracy_m: float, sync: float
+) -> None:
+    from choice_instances import write_spec
+
+    case = load(write_spec(tmp_path, 1, 3, 3, 8, accuracy_m=accuracy_m, sync=sync))
+    problem = build_problem(case)
+    found = list(platform_fixes(case, problem, build_problem))
+
+    def built(case, problem, build, stage: int):
+        return lambda _, figure, at: build(
+            with_platform_figure(case, stage, figure, quantity(at, PLATFORM_FIGURES[figure][1]))
+        )
+
+    monkeypatch.setattr(fixes_of_platforms, "platform_what_if", built)
+    monkeypatch.setattr(Existence, "of", lambda _, problem: is_feasible(problem))
+    assert found == list(platform_fixes(case, problem, build_problem))
+    assert found
+
+
+def test_designs_that_others_had_are_taken_for_none_that_they_are_not() -> None:
+    """One problem after the other with other limits and another sensor's error, enumerated."""
+    said = []
+    for seed in SEEDS:
+        rng = random.Random(seed)
+        first, existence = random_problem(rng, 20), Existence()
+        errors = [found.error_m for _, found in all_designs(first)]
+        for _ in range(12):
+            r = rng.randrange(len(first.roles))
+            rows = of_sensor(first, r, rng.randrange(len(first.roles[r].options)))
+            changed = with_sensor_error(first, r, rows, Fraction(rng.randint(1, 40), 16))
+            problem = with_random_limits(rng, changed, errors)
+            said.append(any(not broken(problem, found) for _, found in all_designs(problem)))
+            assert existence.of(problem) == said[-1]
+    assert 40 < sum(said) < len(said) - 40
 
 
 def _exact(option, column: str) -> float:

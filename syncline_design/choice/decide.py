@@ -126,19 +126,20 @@ def best_by_front(problem: Problem, deadline: Deadline) -> Design | None:
     return _agreed(problem, picked, first, "merging", "best-first search")
 
 
-def has_design(problem: Problem, deadline: Deadline) -> bool | None:
-    """Whether the merge finds a design that keeps every sum, simulation apart.
+def some_design(problem: Problem, deadline: Deadline) -> Design | None:
+    """The most accurate design that the merge finds to keep every sum, simulation apart.
 
     As sure as the best design: none where nothing is left of the merge, and one that is found is
-    decided exactly.  None where all that is left is as close to a limit as floats cannot tell.
+    decided exactly.  TooLarge where all that is left is as close to a limit as floats cannot tell.
     """
     deadline.check()
-    if is_empty(problem):
-        return False
-    points = _merged(problem, deadline)
+    points = () if is_empty(problem) else _merged(problem, deadline)
     if not points:
-        return False
-    return any(not broken(problem, evaluate(problem, p.design)) for p in points) or None
+        return None
+    for point in reversed(points):
+        if not broken(problem, evaluate(problem, point.design)):
+            return point.design
+    raise TooLarge("designs that are all as close to a limit as floats tell apart")
 
 
 def _merged(problem: Problem, deadline: Deadline) -> Sequence[FrontPoint]:

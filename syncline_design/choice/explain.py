@@ -94,7 +94,7 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
     fixes += _proven(lambda: method_fixes(case, build, problem))
     fixes += _proven(lambda: fact_fixes(case, problem, build))
     with _spending(problem):
-        fixes += _proven(lambda: platform_fixes(case, build))
+        fixes += _proven(lambda: platform_fixes(case, problem, build))
     fixes = by_size(fixes)
     joint = tuple(sorted((tuple(map(_measured, some)) for some in joint), key=_largest))
     with _spending(problem):

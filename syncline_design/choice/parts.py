@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import field, replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 from syncline_design.choice.acceptable import iter_acceptable
-from syncline_design.choice.decide import has_design
-from syncline_design.choice.evaluate import Evaluation, evaluate
+from syncline_design.choice.decide import some_design
+from syncline_design.choice.evaluate import Evaluation, broken, evaluate
 from syncline_design.choice.holding import best_design
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import TooLarge
-from syncline_design.choice.table import Limits, Objective, Problem, with_limits
+from syncline_design.choice.table import Design, Limits, Objective, Problem, with_limits
+from syncline_design.choice.what_if import same_design
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.requirement import SUMMED_KINDS
 
 FIELDS = {"accuracy": "accuracy_m", "sample_spacing": "spacing_m"}  # of Limits, else the kind
@@ -24,6 +26,7 @@ SIMULATED = "monte_carlo"
 STEPS = 40
 CLOSE = 1e-4
 LARGEST_RATIO = 1e12
+MOST_KEPT = 2  # designs that are tried before others are looked for
 MOST_TRIED = 60  # designs simulated for the least limit of a simulated requirement
 
 
@@ -84,12 +87,35 @@ def solve(problem: Problem) -> Evaluation | None:
 
 def is_feasible(problem: Problem) -> bool:
     """Whether any design meets every requirement; which is the best of them is not asked."""
+    return any_design(problem) is not None
+
+
+def any_design(problem: Problem) -> Design | None:
+    """A design that meets every requirement, the best or not; None when there is none."""
     if problem.judge is None:
         with suppress(TooLarge):
-            found = has_design(problem, in_force())
-            if found is not None:
-                return found
-    return solve(problem) is not None
+            return some_design(problem, in_force())
+    return best_design(problem)
+
+
+@dataclass
+class Existence:
+    """Whether problems that are much alike have a design: one that another had is tried first."""
+
+    found: list[tuple[Problem, Design]] = field(default_factory=list)
+
+    def of(self, problem: Problem) -> bool:
+        """Whether any design meets every requirement."""
+        if problem.judge is None and any(self._stands(problem, *one) for one in self.found):
+            return True
+        design = any_design(problem)
+        if design is not None:
+            self.found = [(problem, design), *self.found[: MOST_KEPT - 1]]
+        return design is not None
+
+    def _stands(self, problem: Problem, other: Problem, design: Design) -> bool:
+        same = same_design(other, design, problem)
+        return same is not None and not broken(problem, evaluate(problem, same))
 
 
 def least(problem: Problem, part: ConflictPart) -> Fraction | None:

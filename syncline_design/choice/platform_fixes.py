@@ -19,17 +19,24 @@ from syncline_design.choice.acceptable import without_simulation
 from syncline_design.choice.option import Option
 from syncline_design.choice.options import Options
 from syncline_design.choice.outcome import Fix
-from syncline_design.choice.parts import CLOSE, is_feasible
-from syncline_design.choice.table import NOTHING, Limits, Pair, Problem, RoleTable, with_limits
+from syncline_design.choice.parts import CLOSE, Existence
+from syncline_design.choice.table import (
+    NOTHING,
+    Limits,
+    Pair,
+    Problem,
+    RoleTable,
+    with_limits,
+)
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
     PLATFORM_UNITS,
     Build,
     PlatformFigure,
     platform_figure,
-    quantity,
     with_platform_figure,
 )
+from syncline_design.choice.what_if import WhatIf, platform_what_if
 from syncline_design.choice.written import DIGITS, in_unit_of
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Dimension, Quantity
@@ -46,9 +53,11 @@ Named = tuple[int, str, str, str]
 SHARES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.01, LEAST_SHARE)
 
 
-def platform_fixes(case: Case, build: Build) -> Iterator[Fix]:
+def platform_fixes(case: Case, problem: Problem, build: Build) -> Iterator[Fix]:
     """The least change of each figure of each stage that helps, a distance to either side."""
+    existence = Existence()
     for index, stage in enumerate(case.spec.stages):
+        what_if = platform_what_if(case, problem, build, index)
         for figure, (words, dimension) in PLATFORM_FIGURES.items():
             before = platform_figure(case, index, figure)
             if not before > 0.0:
@@ -56,7 +65,10 @@ def platform_fixes(case: Case, build: Build) -> Iterator[Fix]:
             written = getattr(before, "text", "")
             ends = (LEAST_SHARE, LARGEST_SHARE) if figure == "distance" else (LEAST_SHARE,)
             for end in ends:
-                asked = _Asked(case, build, index, figure, dimension, float(before), written)
+                asked = _Asked(
+                    case, problem, build, what_if, existence, index, figure, dimension,
+                    float(before), written,
+                )  # fmt: skip
                 after = asked.nearest(end * float(before))
                 if after is not None:
                     text = f"{words} of {stage.name} from {_shown(before, dimension)}"
@@ -84,10 +96,17 @@ def _shown(value: float, dimension: Dimension) -> str:
 
 @dataclass
 class _Asked:
-    """One figure of one stage, and what is known of its values."""
+    """One figure of one stage, and what is known of its values.
+
+    problem: of the case as it is; what_if: by the value of a figure, as quick as can be; build:
+    anew from a changed case.
+    """
 
     case: Case
+    problem: Problem
     build: Build
+    what_if: WhatIf
+    existence: Existence
     stage: int
     figure: PlatformFigure
     dimension: Dimension
@@ -114,18 +133,18 @@ class _Asked:
         last = self._problem(end)
         if last.judge is None or end > self.before or self._edges(self.before, end):
             return False
-        return is_feasible(without_simulation(last)) and not is_feasible(last)
+        return self.existence.of(without_simulation(last)) and not self.existence.of(last)
 
     def _problem(self, value: float) -> Problem:
         if value not in self.problems:
-            self.problems[value] = self.build(self._changed(quantity(value, self.dimension)))
+            self.problems[value] = self.what_if(self.problem, self.figure, value)
         return self.problems[value]
 
     def _changed(self, value: Quantity) -> Case:
         return with_platform_figure(self.case, self.stage, self.figure, value)
 
     def _holds(self, value: float) -> bool:
-        return is_feasible(self._problem(value))
+        return self.existence.of(self._problem(value))
 
     def _window(self, near: float, end: float) -> tuple[float, float] | None:
         """Nearest (value that fails, value next to it that keeps the sums)."""
@@ -135,7 +154,7 @@ class _Asked:
                 return None
             one, other = ranges.pop()
             best = better_of(self._problem(one), self._problem(other), self._moved(one, other))
-            if not is_feasible(best):
+            if not self.existence.of(best):
                 continue
             if abs(other - one) <= CLOSE * max(one, other):
                 for value in (*self._edges(one, other), other):
@@ -227,7 +246,7 @@ class _Asked:
         return keeps, breaks
 
     def _keeps_sums(self, value: float) -> bool:
-        return is_feasible(without_simulation(self._problem(value)))
+        return self.existence.of(without_simulation(self._problem(value)))
 
     def _options(self, value: float) -> set[Named]:
         return {
@@ -255,7 +274,7 @@ class _Asked:
             shown = in_unit_of(
                 self.written, Fraction(value), self.dimension, up=end > value, digits=digits
             )
-            if is_feasible(self.build(self._changed(shown))):
+            if self.existence.of(self.build(self._changed(shown))):
                 return shown
         return None
 

@@ -32,13 +32,12 @@ from syncline_design.choice.variations import (
     Build,
     PlatformFigure,
     platform_figure,
-    quantity,
-    with_platform_figure,
 )
 from syncline_design.choice.what_if import (
-    Moving,
+    WhatIf,
     of_method,
     of_sensor,
+    platform_what_if,
     same_design,
     with_method_tau,
     with_sensor_error,
@@ -231,34 +230,6 @@ def gone(problem: Problem) -> str:
             distance = float(table.distance_m)
             return "sample_spacing" if beyond.reach(distance, distance).all() else "feasible"
     return "sync"
-
-
-def hangs_on_motion(case: Case, problem: Problem) -> bool:
-    """Whether something besides noise and timing changes with how a platform moves."""
-    tables = (one.entry.tables for s in case.stages for role in s.roles for one in role.sensors)
-    return (
-        bool(case.effects)
-        or any(tables)
-        or any(bool((table.pool().added != table.pool().error).any()) for table in problem.roles)
-    )
-
-
-WhatIf = Callable[[Problem, PlatformFigure, float], Problem]
-
-
-def platform_what_if(case: Case, problem: Problem, build: Build, stage: int) -> WhatIf:
-    """A problem by the value of a figure of one stage's platform.
-
-    Known effects and simulation hang on how a platform moves: there the whole is built anew.
-    """
-    if not hangs_on_motion(case, problem) and problem.judge is None:
-        return Moving.of(case, problem, stage).at
-
-    def built(_: Problem, figure: PlatformFigure, at: float) -> Problem:
-        value = quantity(at, PLATFORM_FIGURES[figure][1])
-        return build(with_platform_figure(case, stage, figure, value))
-
-    return built
 
 
 def payload(problem: Problem, design: Design) -> tuple[tuple[str, str], ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 
@@ -17,7 +17,15 @@ from syncline_design.choice.options import MARGIN, Bools, Floats, Options
 from syncline_design.choice.problem import with_motions
 from syncline_design.choice.stage_motion import StageMotion, motion_of, sensor_error
 from syncline_design.choice.table import Design, Problem, RoleTable
-from syncline_design.choice.variations import PlatformFigure, SheetFigure, with_changed
+from syncline_design.choice.variations import (
+    PLATFORM_FIGURES,
+    Build,
+    PlatformFigure,
+    SheetFigure,
+    quantity,
+    with_changed,
+    with_platform_figure,
+)
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Quantity
@@ -233,3 +241,31 @@ def _with_figure(motion: StageMotion, figure: PlatformFigure, value: Fraction) -
         return motion
     nearest = None if motion.nearest is None else min(motion.nearest, value)
     return replace(motion, distance=value, nearest=nearest)
+
+
+def hangs_on_motion(case: Case, problem: Problem) -> bool:
+    """Whether something besides noise and timing changes with how a platform moves."""
+    tables = (one.entry.tables for s in case.stages for role in s.roles for one in role.sensors)
+    return (
+        bool(case.effects)
+        or any(tables)
+        or any(bool((table.pool().added != table.pool().error).any()) for table in problem.roles)
+    )
+
+
+WhatIf = Callable[[Problem, PlatformFigure, float], Problem]
+
+
+def platform_what_if(case: Case, problem: Problem, build: Build, stage: int) -> WhatIf:
+    """A problem by the value of a figure of one stage's platform.
+
+    Known effects and simulation hang on how a platform moves: there the whole is built anew.
+    """
+    if not hangs_on_motion(case, problem) and problem.judge is None:
+        return Moving.of(case, problem, stage).at
+
+    def built(_: Problem, figure: PlatformFigure, at: float) -> Problem:
+        value = quantity(at, PLATFORM_FIGURES[figure][1])
+        return build(with_platform_figure(case, stage, figure, value))
+
+    return built

@@ -28,7 +28,6 @@ from syncline_design.choice.slack import (
     error_limit,
     gone,
     payload,
-    platform_what_if,
     tau_limits,
     with_change,
 )
@@ -40,7 +39,12 @@ from syncline_design.choice.variations import (
     PlatformFigure,
     platform_figure,
 )
-from syncline_design.choice.what_if import same_design, with_method_tau, with_sensor_error
+from syncline_design.choice.what_if import (
+    platform_what_if,
+    same_design,
+    with_method_tau,
+    with_sensor_error,
+)
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.verdict.family import Chosen, Work, with_problems
