@@ -58,6 +58,14 @@ def browser() -> Iterator[object]:
     yield from launched()
 
 
+@pytest.fixture
+def figures_drawn_once() -> Iterator[object]:
+    """Figures are drawn once a process, for tests of what is said beside them."""
+    from drawn_once import kept
+
+    yield from kept()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection(session: pytest.Session) -> None:
     """Workers that collect the whole suite begin at different files, and find the rest compiled.

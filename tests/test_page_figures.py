@@ -32,6 +32,8 @@ from syncline_design.verdict.optimize import (
 from syncline_design.verdict.verify import CheckSettings
 from tests.checked import check_file
 
+pytestmark = pytest.mark.usefixtures("figures_drawn_once")
+
 ROOT = Path(__file__).parent.parent
 PLAIN = CheckSettings(monte_carlo=False)
 MULTIROTOR = ROOT / "specs" / "multirotor_inspection.yaml"

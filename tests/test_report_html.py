@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import pytest
 
 import report_samples as samples
+from drawn_once import Kept
 from html_page import Page
 from syncline_design.machine.records import Record
 from syncline_design.paper.errata import ERRATA
@@ -28,6 +29,8 @@ from syncline_design.report.table import table
 from syncline_design.report.text import visible
 from syncline_design.simulation.results import ProportionEstimate
 from syncline_design.verdict.tree import FileProblem, Refused
+
+pytestmark = pytest.mark.usefixtures("figures_drawn_once")
 
 
 @pytest.fixture(scope="module")
@@ -248,8 +251,10 @@ def test_hostile_text_is_literal_in_figures(text: str) -> None:
 
 
 @pytest.mark.parametrize("make", [samples.fixed_wing, samples.infeasible])
-def test_same_input_same_bytes(make: Any) -> None:
-    assert html(on_verdict(make())) == html(on_verdict(make()))
+def test_same_input_same_bytes(make: Any, figures_drawn_once: Kept) -> None:
+    first = html(on_verdict(make()))
+    figures_drawn_once.clear()
+    assert html(on_verdict(make())) == first
 
 
 def test_same_bytes_in_another_process() -> None:

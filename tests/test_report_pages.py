@@ -12,6 +12,7 @@ import pytest
 
 import report_samples as samples
 from diagnosis_samples import DESIGN, LATENCY, diagnosis
+from drawn_once import Kept
 from html_page import Page
 from syncline_design.comparison.meaning import DiagnosisAndDesign, ErrorFigure
 from syncline_design.comparison.repairs import Repair, RepairStep
@@ -46,6 +47,8 @@ from syncline_design.simulation.comparison import CAUSES
 from syncline_design.verdict.tree import decided
 from tests.simulation_systems import fixed_wing
 
+pytestmark = pytest.mark.usefixtures("figures_drawn_once")
+
 
 def hostile(text: str) -> DiagnosisAndDesign:
     """A diagnosis whose every text that is not one of ours is hostile; keys of mappings too."""
@@ -63,8 +66,10 @@ def test_page_is_well_formed_and_fetches_nothing() -> None:
     assert page.attribute("img", "src") == []
 
 
-def test_same_input_same_bytes() -> None:
-    assert html(on_diagnosis(diagnosis())) == html(on_diagnosis(diagnosis()))
+def test_same_input_same_bytes(figures_drawn_once: Kept) -> None:
+    first = html(on_diagnosis(diagnosis()))
+    figures_drawn_once.clear()
+    assert html(on_diagnosis(diagnosis())) == first
 
 
 def test_errors_beside_a_limit_stand_in_its_unit() -> None:
