@@ -271,6 +271,27 @@ def test_sessions_that_are_alike_are_not_one(kind: str, tmp_path: Path) -> None:
     assert len(read_logs(logs).series) == 20
 
 
+def test_one_log_is_looked_for_in_another_only_as_far_as_rows_are_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twenty unlike days: few comparisons of columns a pair; a whole probe has 1 400."""
+    rng, compared, plain = np.random.default_rng(13), [0], np.abs
+    logs = []
+    for day in range(20):
+        times = START + 86400.0 * day + 10.0 * np.arange(300)
+        late = 3e-4 + 1e-6 * rng.standard_normal(300)
+        logs.append(write(tmp_path / f"{day}.csv", _table("ns", times, late, 1e9, 0)))
+
+    def counted(values: Array) -> Array:
+        compared[0] += 1
+        return plain(values)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(np, "abs", counted)
+        read_logs(logs)
+    assert compared[0] < 100 * 190
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_clocks_compared_at_the_same_moments_are_not_one_session(seed: int, tmp_path: Path) -> None:
     """Two clocks of one room: half of their noise, and the day's temperature, is one."""

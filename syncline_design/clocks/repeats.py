@@ -114,7 +114,9 @@ def _places(own: Array, others: Array, least: float) -> Iterator[tuple[int, int]
         begun = np.flatnonzero(np.abs(others - probe[0]) <= least)
         for stride in range(1, _THINNED + 1):
             at = begun[begun + stride * (_PROBE - 1) < others.shape[0]]
-            for k, value in enumerate(probe):
+            for k, value in enumerate(probe[1:], 1):
+                if not at.size:  # as for most logs, after a row or two
+                    break
                 at = at[np.abs(others[at + k * stride] - value) <= least]
             yield from ((int(where) - begin * stride, stride) for where in at[:1])
 
