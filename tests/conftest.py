@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import functools
 import gc
 import importlib
 import os
@@ -36,6 +37,17 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
 if SHARED not in os.environ:
     os.environ[SHARED] = tempfile.mkdtemp(prefix="shared-")
     atexit.register(shutil.rmtree, os.environ[SHARED], ignore_errors=True)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_parser() -> Iterator[None]:
+    """The parser of the command line is made once, not for each command that a test invokes."""
+    from typer import testing
+
+    made = functools.cache(testing._get_command)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(testing, "_get_command", made)
+        yield
 
 
 @pytest.fixture(autouse=True, scope="module")
