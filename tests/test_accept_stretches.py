@@ -146,13 +146,17 @@ def slipping(folder: Path, share: float) -> tuple[Path, Path]:
     return spec, log
 
 
-def moved_for_a_while(folder: Path, *parts: tuple[float, float]) -> tuple[Path, Path]:
-    """Spec and log of a vehicle whose ranging sensor is turned by 0.5 deg in parts of its log."""
+TILTED = hidden("boresight", "ranging", x_rad=0.009, y_rad=0.0, z_rad=0.0)
+
+
+def moved_for_a_while(
+    folder: Path, *parts: tuple[float, float], moved: Hidden = TILTED
+) -> tuple[Path, Path]:
+    """Spec and log of a vehicle of which something is turned by 0.5 deg in parts of its log."""
     run = world("multirotor_lines", 9)
     spec, log = files(folder, run)
     lines = log.read_text("utf-8").splitlines()
-    turned = make_log(run, (hidden("boresight", "ranging", x_rad=0.009, y_rad=0.0, z_rad=0.0),))
-    other = turned.to_csv(folder / "turned.csv").read_text("utf-8").splitlines()
+    other = make_log(run, (moved,)).to_csv(folder / "turned.csv").read_text("utf-8").splitlines()
     for first, last in parts:
         rows = slice(1 + round(first * len(lines)), 1 + round(last * len(lines)))
         lines[rows] = other[rows]
@@ -179,6 +183,17 @@ def test_a_mount_that_is_moved_and_put_back_is_no_noise(
         assert row.to_s is not None
         assert any(60.0 * first - 1.0 < row.from_s < row.to_s < 60.0 * last + 1.0
                    for first, last in parts), row  # fmt: skip
+
+
+def test_an_attitude_that_is_turned_in_yaw_and_back_is_no_azimuth_alone(tmp_path: Path) -> None:
+    """An azimuth has one figure and a mounting three: that is no proof against the mounting."""
+    turned = hidden("mounting", "attitude", x_rad=0.0, y_rad=0.0, z_rad=0.009)
+    spec, log = moved_for_a_while(tmp_path, (0.3, 0.6), moved=turned)
+    told = accept(load(spec), [log], AcceptSettings(("mounting",)), seed=0)
+    assert told.exit_code == 1, told.assumptions
+    (row,) = [one for one in told.assumptions if one.role == "attitude"]
+    assert row.status == "broken" or row.one_of, row
+    assert not [one for one in told.assumptions if one.status == "broken" and one.role == "ranging"]
 
 
 def test_a_mount_that_slips_stands_out(tmp_path: Path) -> None:

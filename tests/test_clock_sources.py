@@ -22,8 +22,13 @@ def _peers(times: Array, late_s: float, delay_s: float, status: str, name: str) 
             for one in lines]  # fmt: skip
 
 
-def _ntpd(folder: Path, *peers: tuple[float, str], until: float = 1.0) -> Timing:
-    """Four days of loopstats, and peers of these delays and states for a part of them."""
+def _ntpd(
+    folder: Path, *peers: tuple[float, str], until: float = 1.0, apart_s: float = 0.0
+) -> Timing:
+    """Four days of loopstats, and peers of these delays and states for a part of them.
+
+    apart_s: by which the peers say more.
+    """
     source, paths = np.random.default_rng(8), []
     for day in range(4):
         at = folder / f"day{day}"
@@ -34,7 +39,8 @@ def _ntpd(folder: Path, *peers: tuple[float, str], until: float = 1.0) -> Timing
         paths.append(write(at / "loopstats", lines))
         heard = times[: round(until * 60)]
         rows = [row for k, (delay_s, status) in enumerate(peers)
-                for row in _peers(heard, LATE_S, delay_s, status, f"192.0.2.{k + 1}")]  # fmt: skip
+                for row in _peers(heard, LATE_S + apart_s, delay_s, status,
+                                 f"192.0.2.{k + 1}")]  # fmt: skip
         if rows:
             paths.append(write(at / "peerstats", rows))
     return study_logs(paths, TimingSettings()).timing
@@ -52,6 +58,28 @@ def test_loopstats_take_the_bound_of_the_peer_that_steers(tmp_path: Path) -> Non
     assert timing.statistical_bound_s is not None
     assert timing.statistical_bound_s < 1.2 * LATE_S
     assert not any("no hard bound" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(
+    ("apart_s", "status", "doubted"),
+    [
+        (1.5e-3, "961a", True),
+        (-1.5e-3, "961a", True),
+        (1.5e-4, "961a", False),
+        (1.5e-3, "9014", False),
+    ],
+)
+def test_a_loop_and_its_peer_that_disagree_are_in_doubt(
+    apart_s: float, status: str, doubted: bool, tmp_path: Path
+) -> None:
+    """0.1 ms of half a round trip of 0.2 ms and 0.1 ms of dispersion: 0.2 ms are allowed."""
+    timing = _ntpd(tmp_path, (2e-4, status), apart_s=apart_s)
+    said = [one for one in timing.doubts if "from what loopstats say" in one]
+    assert bool(said) is doubted
+    assert timing.claim.made is not doubted
+    if doubted:
+        assert "1.5 ms" in said[0]
+        assert "200 us" in said[0]
 
 
 def test_of_two_selected_peers_the_larger_bound_counts(tmp_path: Path) -> None:

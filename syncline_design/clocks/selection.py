@@ -11,9 +11,10 @@ import numpy as np
 
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.linuxptp import FOLLOWS_SYSTEM, SYSTEM
-from syncline_design.clocks.ntpd import LOOPSTATS, PEERSTATS
+from syncline_design.clocks.ntpd import LOOPSTATS
+from syncline_design.clocks.peers import bounded_by_peers, unlike_their_peers
 from syncline_design.clocks.result import ClockEntryKind
-from syncline_design.clocks.series import Array, ClockSeries
+from syncline_design.clocks.series import ClockSeries
 from syncline_design.clocks.sessions import sessions_of
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -28,18 +29,20 @@ SIGNS: Final = {
     "ppstest": "clock - whole second in the log",
     "CSV": "local - reference by the column's name",
 }
-LAST_POLLS: Final = 10.0  # polls that a peer's bound is taken to last
-POLLED_TOGETHER_S: Final = 1.0  # a poll's line in peerstats and in loopstats are of one moment
 _LINUXPTP_SIGN: Final = "local - reference in the log"
 
 
 @dataclass(frozen=True, slots=True)
 class SourceSelection:
-    """Series of the source that is used, all others, and what has to be said of the choice."""
+    """Series of the source that is used, all others, and what has to be said of the choice.
+
+    doubts: where what is used and what it was made from disagree.
+    """
 
     used: tuple[ClockSeries, ...]
     others: tuple[ClockSeries, ...]
     notes: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
 
 def sign_of(name: str) -> str:
@@ -51,7 +54,7 @@ def select(
     series: Sequence[ClockSeries], wanted: str | None, kind: ClockEntryKind, first: Path
 ) -> SourceSelection:
     """The source asked for, or the one that says most of the clock; refused where none does."""
-    series = [*_bounded_by_peers(series), *_chained(series)]
+    series = [*bounded_by_peers(series), *_chained(series)]
     names = list(dict.fromkeys(one.kind.name for one in series))
     if wanted is not None:
         chosen = [name for name in names if name == wanted] or [
@@ -150,39 +153,11 @@ def _independent_refclocks(series: Sequence[ClockSeries]) -> tuple[list[ClockSer
     return found, list(dict.fromkeys(notes))
 
 
-def _bounded_by_peers(series: Sequence[ClockSeries]) -> list[ClockSeries]:
-    """Loopstats with the bound of the peers that ntpd selected at the time.
-
-    loopstats hold neither delays nor dispersions; peerstats of the same daemon do.  Of several
-    selected peers the largest bound counts, which is no smaller than that of whichever steered.
-    """
-    selected = [s for s in series if s.kind.reference and s.kind.reference in s.references]
-    peers = [s for s in selected if s.kind.name.startswith(PEERSTATS)]
-    return [_with_bound(s, peers) if s.kind == LOOPSTATS and peers else s for s in series]
-
-
-def _with_bound(loop: ClockSeries, peers: Sequence[ClockSeries]) -> ClockSeries:
-    bounds = np.array([_last_bound(peer, loop.time_s) for peer in peers])
-    known = np.any(np.isfinite(bounds), axis=0)
-    hard = np.max(np.where(np.isfinite(bounds), bounds, 0.0), axis=0)
-    hard = np.maximum(hard, np.abs(loop.offset_s))
-    return replace(loop, hard_s=np.where(known, hard, np.nan))
-
-
-def _last_bound(peer: ClockSeries, time_s: Array) -> Array:
-    """A peer's bound at its last poll before each moment, where that is not long ago."""
-    order = np.argsort(peer.time_s, kind="stable")
-    polled, hard = peer.time_s[order], peer.hard_s[order]
-    last = np.searchsorted(polled, time_s + POLLED_TOGETHER_S, side="right") - 1
-    reach = LAST_POLLS * float(np.median(np.diff(polled))) if len(polled) > 1 else 0.0
-    heard = (last >= 0) & (time_s - polled[np.maximum(last, 0)] <= max(reach, 1.0))
-    bound: Array = np.where(heard, hard[np.maximum(last, 0)], np.nan)
-    return bound
-
-
 def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> SourceSelection:
     used = tuple(one for one in series if one.kind.name == name)
-    return SourceSelection(used, tuple(one for one in series if one.kind.name != name), notes)
+    others = tuple(one for one in series if one.kind.name != name)
+    loops = [one for one in used if one.kind == LOOPSTATS]
+    return SourceSelection(used, others, notes, tuple(unlike_their_peers(loops, others)))
 
 
 def _chained(series: Sequence[ClockSeries]) -> list[ClockSeries]:

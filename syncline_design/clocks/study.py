@@ -93,7 +93,7 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
                       hint="is --session shorter than the time between samples?")  # fmt: skip
     sessions = [s for one in chosen.used for s in sessions_of(one, settings.gap_s)]
     sessions.sort(key=lambda s: (s.series.kind.stamps, s.series.time_s[0], s.series.files))
-    doubted = doubts(chosen.used, sessions)
+    doubted = (*chosen.doubts, *doubts(chosen.used, sessions))
     in_force().doing("bounding the clock's error")
     counted = [s for s in sessions if s.is_counted]
     figures = _figures(counted, sessions, settings, claimable=not doubted)

@@ -13,6 +13,7 @@ from syncline_design.model.figure_text import rounded, to_digits
 
 CHANCE: Final = 0.005  # with which sessions that are alike are said to run off
 MATERIAL: Final = 0.2  # of the bound: how far over all sessions, to be worth a word
+RUN_OFF: Final = "the sessions run off"  # how the note begins
 _FEWEST: Final = 6  # whose order can be as unlikely as that: 2 / 6! = 0.003
 
 
@@ -35,7 +36,7 @@ def running_off(counted: Sequence[ClockSession], bound_s: float | None) -> str |
     chance = float(kendalltau(order, medians).pvalue)
     if not chance < CHANCE:
         return None
-    return (f"the sessions run off: from one to the next their medians move by "
+    return (f"{RUN_OFF}: from one to the next their medians move by "
             f"{shown(rounded(slope, 2))} or so, and alike ones would stand in such an order with a "
             f"chance of {to_digits(chance, 1)}; the claim takes them for alike, so it is for none "
             "much later than these")  # fmt: skip

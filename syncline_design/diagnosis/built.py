@@ -72,7 +72,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
         seen, taken = _seen(one), []
         for _ in range(ROUNDS):
             sure = [s for s in seen.stands if s.sure]
-            less = _less(one.inputs, sure)
+            less = _less(one.inputs, sure, (1.0 - MOST_TAKEN) * len(inputs.log))
             if less is None:
                 break
             taken += sure
@@ -115,12 +115,12 @@ def _built_in_undone(one: SearchedLog) -> Model:
     return replace(model, acting=kept, error=one.data.error(kept))
 
 
-def _less(inputs: Measured, taken: Sequence[Stands]) -> Measured | None:
-    """The log without some stretches; None where that is nothing, or too much of it."""
+def _less(inputs: Measured, taken: Sequence[Stands], least: float) -> Measured | None:
+    """The log without some stretches; None where that is nothing, or leaves too few rows."""
     time_s = inputs.log.time_s
     inside = np.zeros(len(time_s), bool)
     for one in taken:
         inside |= (time_s >= one.from_s - one.margin_s) & (time_s <= one.to_s + one.margin_s)
-    if not np.any(inside) or np.mean(inside) > MOST_TAKEN:
+    if not np.any(inside) or np.sum(~inside) < least:
         return None
     return replace(inputs, log=inputs.log.rows(np.flatnonzero(~inside)), reread=None)

@@ -146,10 +146,11 @@ class _Hit:
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """A candidate fitted in a window: nat saved, its figures paid for."""
+    """A candidate fitted in a window: nat saved with its figures paid for, and without."""
 
     signature: Signature
     nats: float
+    saved: float
     values: tuple[float, ...]
     spreads: tuple[float, ...]
 
@@ -255,7 +256,8 @@ def _named(data: Data, model: Model, asked: Sequence[Signature], hit: _Hit) -> S
     """What fits a window best by re-simulation, and what fits it as well.
 
     Each figure costs half of log N nat.  Of those within AS_GOOD_NATS the commonest is named,
-    what comes and goes before what is built in.
+    what comes and goes before what is built in.  What breaks another row needs not pay: that it has
+    more figures is no proof against it (a turn of the attitude that looks like an azimuth).
     """
     white = precision(data.structure, _as_loud(data.structure, model))
     tried = (_fitted(data, model, white, s, hit) for s in asked)
@@ -263,7 +265,13 @@ def _named(data: Data, model: Model, asked: Sequence[Signature], hit: _Hit) -> S
     if not fits:
         return None
     best = max(fits, key=lambda each: each.nats)
-    as_good = [each for each in fits if each.nats > best.nats - AS_GOOD_NATS]
+    row = _row(best.signature.candidate)
+    as_good = [
+        each
+        for each in fits
+        if each.nats > best.nats - AS_GOOD_NATS
+        or (_row(each.signature.candidate) != row and each.saved > best.saved - AS_GOOD_NATS)
+    ]
     named = min(as_good, key=lambda each: _seldom(each.signature.candidate))
     own = _told(data, named)
     others = tuple(_told(data, other) for other in as_good if other is not named)
@@ -314,6 +322,11 @@ def is_inside(from_s: float, to_s: float, ends_s: tuple[float, float]) -> bool:
     return from_s - first > margin_s and last - to_s > margin_s
 
 
+def _row(one: Candidate) -> tuple[str, str, int]:
+    """What it breaks, of which sensor."""
+    return one.effect.breaks, one.sensor, one.stage
+
+
 def _told(data: Data, fit: _Fit) -> OtherFit:
     one = fit.signature.candidate
     return OtherFit(
@@ -344,7 +357,7 @@ def _fitted(data: Data, model: Model, white: Precision, s: Signature, hit: _Hit)
     saved = white.negative_log_likelihood(before) - white.negative_log_likelihood(after)
     spreads = np.sqrt(scale2 * np.maximum(np.diag(covariance)[-len(slopes) :], 0.0))
     nats = saved / scale2 - 0.5 * len(slopes) * math.log(rows)
-    return _Fit(s, nats, values, tuple(map(float, spreads)))
+    return _Fit(s, nats, saved / scale2, values, tuple(map(float, spreads)))
 
 
 def _usual_gap_s(time_s: Array) -> float:
