@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import random
+import re
 from decimal import ROUND_HALF_EVEN, Decimal
 from types import SimpleNamespace
 
 import pytest
 
 from syncline_design.report import numbers
-from syncline_design.report.columns import alike, errors, padded
+from syncline_design.report.columns import alike, errors, padded, worded
 from syncline_design.report.table import Cell, table
 
 METRES = SimpleNamespace(limit=0.3, unit="m", limit_written="0.30 m")
@@ -91,6 +92,32 @@ def test_texts_alone_get_back_the_zeros_that_they_lost() -> None:
         "900.00 EUR", "12 862.35 EUR",
     ]  # fmt: skip
     assert _spaced(padded(["10\u00a0%", "95\u00a0%", "a", ""])) == ["10 %", "95 %", "a", ""]
+
+
+@pytest.mark.parametrize(
+    ("column", "shown"),
+    [
+        (["7.9 % to spare", "1.82 % to spare", "10.5 % over", "-"],
+         ["7.90 % to spare", "1.82 % to spare", "10.5 % over", "-"]),
+        (["0.3266 m to 0.332 m", "12 mm to 13.25 mm"],
+         ["0.3266 m to 0.3320 m", "12.00 mm to 13.25 mm"]),
+        (["0.5 m to 1 m"], ["0.5 m to 1 m"]),
+        # no figures alone: as they are
+        (["exactly at the limit", "1.82 % to spare"], ["exactly at the limit", "1.82 % to spare"]),
+        (["from 5 m to 7.25 m", "7.9 % to go", "1 m to 2 m to 3.25 m"],
+         ["from 5 m to 7.25 m", "7.9 % to go", "1 m to 2 m to 3.25 m"]),
+    ],
+)  # fmt: skip
+def test_figures_with_words_stand_with_as_many_digits(column: list[str], shown: list[str]) -> None:
+    typeset = [re.sub(r"(?<=\d) ", "\N{NO-BREAK SPACE}", text) for text in column]
+    assert _spaced(worded(typeset)) == shown
+
+
+def test_a_table_aligns_its_margins() -> None:
+    rows = [(Cell(numbers.typeset("7.9 %") + " to spare", 0.079),),
+            (Cell(numbers.typeset("1.82 %") + " to spare", 0.0182),)]  # fmt: skip
+    found = table("Requirements", ("Margin #",), rows)
+    assert _spaced([row[0].text for row in found.rows]) == ["7.90 % to spare", "1.82 % to spare"]
 
 
 def test_errors_beside_a_limit_are_in_its_unit_to_the_same_place() -> None:

@@ -18,6 +18,7 @@ from syncline_design.report.numbers import Limited, error, typeset
 
 MORE_DIGITS: Final = 1  # of the largest figure of a column; beyond, each has a place of its own
 SUMS: Final = (Dimension.MASS, Dimension.POWER)
+_WORDED: Final = (" to spare", " over")  # behind a margin
 _SPACE: Final = "\N{NO-BREAK SPACE}"
 _FIGURE: Final = re.compile(
     r"(?P<number>[\u2212+]?\d+(?:\u00a0\d{3})*(?:\.(?P<decimals>\d+))?)(?:\u00a0(?P<unit>\S+))?"
@@ -89,6 +90,28 @@ def padded(column: Sequence[str]) -> list[str]:
         for (k, one), decimals in zip(together, wanted, strict=True):
             found[k] = one.to(decimals)
     return found
+
+
+def worded(column: Sequence[str]) -> list[str]:
+    """The same of figures with a word: margins (`7.90 % to spare`), intervals (`0.32 m to 1.40 m`).
+
+    What is neither stays as it is.
+    """
+    parts = [_ends(text) for text in column]
+    again = iter(padded([end for ends, _ in parts for end in ends]))
+    shown = [(" to ".join([next(again) for _ in ends]), word) for ends, word in parts]
+    return [
+        figures + word if figures else text
+        for text, (figures, word) in zip(column, shown, strict=True)
+    ]
+
+
+def _ends(text: str) -> tuple[list[str], str]:
+    """The figures of a margin or of an interval, and the word behind; none of another text."""
+    word = next((end for end in _WORDED if text.endswith(end)), "")
+    ends = text.removesuffix(word).split(" to ")
+    known = len(ends) == (1 if word else 2) and all(map(_FIGURE.fullmatch, ends))
+    return (ends, word) if known else ([], "")
 
 
 def _in_one_unit(together: Sequence[_Figure]) -> Sequence[_Figure]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Final, Literal
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.report.columns import alike
+from syncline_design.report.columns import alike, worded
 from syncline_design.report.text import unticked
 
 Tone = Literal["", "good", "bad", "warn", "muted"]
@@ -76,8 +76,8 @@ def table(
 
 def _alike(column: Sequence[Cell]) -> Sequence[Cell]:
     """A column of figures, all to the same place or to the same number of digits."""
-    texts = alike([(cell.text, None if cell.written else cell.sort) for cell in column])
+    texts = worded(alike([(cell.text, None if cell.written else cell.sort) for cell in column]))
     return [
-        cell if cell.text == text else replace(cell, text=text)
+        cell if cell.written or cell.text == text else replace(cell, text=text)
         for cell, text in zip(column, texts, strict=True)
     ]
