@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
+from syncline_design.clocks import rollover
 from syncline_design.clocks.files import LogFile, refused
 from syncline_design.clocks.series import FARTHEST_S, Row, Sheet, SourceKind
 from syncline_design.machine.csv_cells import NotCellsError, cells_of
@@ -21,6 +22,7 @@ _UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "\N{MICRO SIGN}s": 1e-6,
                  "\N{GREEK SMALL LETTER MU}s": 1e-6, "ns": 1e-9, "ps": 1e-12}  # fmt: skip
 _QUANTITY: Final = re.compile(r"(time|t|offset|bound)(?:_|\s*[\[(]\s*)([a-z\u00b5\u03bc]+)[\])]?")
 _TRUE, _FALSE = ("1", "true", "yes", "locked"), ("0", "false", "no", "unlocked")
+_LEAP: Final = re.compile(r"(.+[T ]\d\d:\d\d):60(.*)")  # the hour is its zone's
 _EARLIEST_UTC: Final = 3e8  # seconds; smaller stamps count from some start
 MOST_CELL: Final = 200
 
@@ -65,11 +67,21 @@ def read(file: LogFile) -> tuple[list[Sheet], list[str]]:
             session = own
     if not sheet.figures:
         raise refused(file.path, "no samples", expected="rows below the header", line=line)
+    said = [f"{file.path}: {len(empty)} rows without time or offset left out, the first in line "
+            f"{empty[0]}"] if empty else []  # fmt: skip
     if not stamps_utc:
         sheet.kind = SourceKind("CSV", "csv", 1, "unknown", "boot")
-    said = (f"{file.path}: {len(empty)} rows without time or offset left out, the first in line "
-            f"{empty[0]}") if empty else ""  # fmt: skip
-    return [sheet], [said] if said else []
+        said += [f"{file.path}: {text}" for text in _count_on(sheet)]
+    return [sheet], said
+
+
+def _count_on(sheet: Sheet) -> list[str]:
+    """Stamps over midnight or the end of a week as those of one session."""
+    found = rollover.unfolded(sheet.columns[:, 0])
+    if not found.folds:
+        return []
+    sheet.move(found.time_s)
+    return [rollover.said(found)]
 
 
 def _split(
@@ -128,6 +140,17 @@ def _unix(text: str) -> float | None:
     return value if _EARLIEST_UTC < value < 1e11 else None
 
 
+def _iso(text: str) -> float | None:
+    """Unix seconds of a date and time; a leap second is the one after 59, as Unix counts it."""
+    leap = _LEAP.fullmatch(text)
+    try:
+        read_as = datetime.fromisoformat(f"{leap[1]}:59{leap[2]}" if leap else text)
+    except ValueError:
+        return None
+    read_as = read_as if read_as.tzinfo else read_as.replace(tzinfo=UTC)
+    return read_as.timestamp() + (1.0 if leap else 0.0)
+
+
 class _Cells:
     """One row of a table."""
 
@@ -176,16 +199,13 @@ class _Cells:
         text = self.cells[self.columns["stamp"]].strip()
         if not text:
             return None
-        try:
-            read_as = datetime.fromisoformat(text)
-        except ValueError:
-            seconds = _unix(text)
-            if seconds is not None:
-                return seconds
+        seconds = _iso(text)
+        seconds = _unix(text) if seconds is None else seconds
+        if seconds is None:
             raise refused(self.file.path, "no time", line=self.line,
                           column=self.columns["stamp"] + 1, expected="ISO 8601, or time_s",
-                          found=repr(text[:40])) from None  # fmt: skip
-        return (read_as if read_as.tzinfo else read_as.replace(tzinfo=UTC)).timestamp()
+                          found=repr(text[:40]))  # fmt: skip
+        return seconds
 
     def _locked(self) -> bool:
         text = self._text("locked")

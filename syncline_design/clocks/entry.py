@@ -151,7 +151,7 @@ def _time(value_s: float) -> str:
         if value_s >= scale or unit == "ns":
             break
     digits = f"{value_s / scale:.6g}"
-    if float(digits) * scale < value_s:
+    if float(digits) * scale < value_s * (1.0 - 1e-12):  # 5 * 1e-6 is no less than 5e-6
         digits = f"{value_s / scale * (1.0 + 1e-5):.6g}"
     return f"{digits} {unit}" if "e" not in digits else f"{float(digits):.12f} {unit}"
 

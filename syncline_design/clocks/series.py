@@ -67,6 +67,12 @@ class Sheet:
         """One more row."""
         self.figures.extend(row)
 
+    def move(self, time_s: Array) -> None:
+        """Other stamps of the same rows."""
+        columns = self.columns.copy()
+        columns[:, 0] = time_s
+        self.figures = array("d", columns.tobytes())
+
     @property
     def columns(self) -> Array:
         """One row of the result is one field of `Row`."""
