@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shlex
 from dataclasses import replace
@@ -15,6 +16,8 @@ from syncline_design.cli.app import app
 from syncline_design.comparison.meaning import DiagnosisAndDesign
 from syncline_design.diagnosis.same_system import description
 from syncline_design.diagnosis.system import pinned_system
+from syncline_design.effects import registry
+from syncline_design.machine import deadline
 from syncline_design.machine.records import read_as
 from syncline_design.planning import next_drive
 from syncline_design.report.diagnoses import render_diagnose
@@ -43,11 +46,9 @@ def diagnosed(straight: tuple[Path, Path]) -> Path:
     """What `diagnose` says of that line: its JSON, and its text beside it."""
     spec, log = straight
     result = spec.parent / "line.json"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(next_drive, "LIMIT_S", 600.0)  # what is found, however busy the machine is
-        done = CliRunner().invoke(
-            app, ["diagnose", str(spec), str(log), "--max-effects", "1", "-o", f"json:{result}"]
-        )
+    done = CliRunner().invoke(
+        app, ["diagnose", str(spec), str(log), "--max-effects", "1", "-o", f"json:{result}"]
+    )
     assert done.exit_code == 1
     result.with_suffix(".txt").write_text(done.stdout, encoding="utf-8")
     return result
@@ -83,13 +84,23 @@ def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
     assert all(pair["separated"] for pair in pairs)
 
 
+def test_the_drive_is_the_same_however_busy_the_machine_is(
+    straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock on which every look at it is an hour later."""
+    found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
+    hours = itertools.count(0.0, 3600.0)
+    monkeypatch.setattr(deadline.time, "monotonic", lambda: next(hours))
+    assert next_drive.next_drive(load(straight[0]), found) == found.plan
+
+
 def test_a_diagnosis_without_a_drive_says_why_and_prints_the_command_that_looks_for_one(
     straight: tuple[Path, Path], diagnosed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spec, _ = straight
     found = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
     case = load(spec)
-    monkeypatch.setattr(next_drive, "LIMIT_S", 0.0)
+    monkeypatch.setattr(next_drive, "MOST_JUDGED", 0)
     late = next_drive.next_drive(case, found)
     assert late is not None
     assert (late.legs, late.minutes, late.reached) == ((), None, False)
@@ -98,7 +109,7 @@ def test_a_diagnosis_without_a_drive_says_why_and_prints_the_command_that_looks_
     assert asked.startswith("latency(position)=30")
     assert "lever_arm(position)" in rivals.split(", ")
     words = render_diagnose("markdown", replace(found, plan=late)).replace("\\", "")
-    assert "No drive that does was found in the time" in words
+    assert "No drive that does was found among those that a diagnosis looks at" in words
     assert late.command in words
     jsonschema.validate(replace(found, plan=late).to_json(), result_schema("diagnosis"))
 
@@ -109,7 +120,6 @@ def test_a_drive_of_more_than_some_hours_is_none_and_no_manoeuvre_is_promised(
     whole = read_as(DiagnosisAndDesign, diagnosed.read_bytes())
     arm = next(r for r in whole.findings[0].aliases if r.effect == "lever_arm")
     found = replace(whole, findings=(replace(whole.findings[0], aliases=(arm,)),))
-    monkeypatch.setattr(next_drive, "LIMIT_S", 600.0)  # however busy the machine is
     monkeypatch.setattr(next_drive, "LONGEST_S", 1.0)
     drive = next_drive.next_drive(load(straight[0]), found)
     assert drive is not None
@@ -133,12 +143,23 @@ def test_a_class_that_no_drive_tells_is_said_to_be_one(
         replace(r, effect=effect, sensor=sensor)
         for (effect, sensor), r in zip(arms, [found.findings[0].aliases[0]] * 2, strict=True)
     )
-    alone = replace(found.findings[0], effect=one.effect, sensor=one.sensor, aliases=(other,))
+    (size,) = found.findings[0].parameters.values()
+    sizes = {p.name: size for p in registry()["lever_arm"].slopes()}
+    alone = replace(
+        found.findings[0], effect=one.effect, sensor=one.sensor, parameters=sizes, aliases=(other,)
+    )
     ends = next_drive.next_drive(load(spec), replace(found, findings=(alone,)))
     assert ends is not None
     assert ends.why_none is not None
-    assert "lever_arm(position) from lever_arm(ranging)" in ends.why_none
+    assert "No drive of this platform can tell lever_arm(position) from lever_arm(ranging)" in (
+        ends.why_none
+    )
     assert ends.legs == ()
+    assert ends.alike == ("lever_arm(ranging)",)
+    said = render_diagnose("markdown", replace(found, findings=(alone,), plan=ends))
+    words = said.replace("\\", "")
+    assert "No drive can: on every leg of this platform they make the same error." in words
+    assert "that does was found" not in words
 
 
 def test_a_flown_log_that_the_platform_cannot_have_made_is_said_to_be_odd(

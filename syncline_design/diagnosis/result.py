@@ -330,7 +330,8 @@ class NextDrive(Record):
     """The test drive that tells a finding from its aliases, in short.
 
     first: the finding; second: the commonest alias that it is told from, others: all further ones.
-    inseparable: aliases that no drive of this platform tells from it, by the size that was found.
+    inseparable: aliases that no drive of this platform tells from it, by the size that was found;
+    alike: of these the ones that make the same error on every leg that it can drive.
     least_minutes: the least that does; minutes, legs: of the drive told here, which does where
     `reached`.  targets: how many to survey.  command: prints the drive whole.
     why_none: why there is no drive, in words; then minutes is None and legs are empty, and command
@@ -348,6 +349,7 @@ class NextDrive(Record):
     why_none: str | None = optional()
     others: tuple[str, ...] | None = optional()
     inseparable: tuple[str, ...] | None = optional()
+    alike: tuple[str, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,6 +43,7 @@ from syncline_design.planning.planned_log import (
 from syncline_design.planning.vehicle import Vehicle
 
 COMPUTED_HZ = 10.0  # rows that are computed; more rows a second count as less noise each
+MOST_ROWS = 12_000  # of a long drive that is only looked at for what it tells
 GAP_S = 1000.0  # between legs that are looked at as one log: no noise lasts so long
 Index = NDArray[np.int64]
 
@@ -53,7 +54,7 @@ class World:
 
     rate_hz: rows a second that the log has.  measured: noise that a diagnosis found.  surveyed:
     targets that are there already (m, 3) [m]; None: they are put where the drive needs them.
-    beyond: pairs that are judged beyond first order.
+    beyond: pairs that are judged beyond first order.  most_hz: rows a second that are computed.
     """
 
     system: System
@@ -62,10 +63,15 @@ class World:
     measured: Noise | None = None
     surveyed: Array | None = None
     beyond: tuple[BeyondFirst, ...] = ()
+    most_hz: float = COMPUTED_HZ
 
     @property
     def computed_hz(self) -> float:
-        return min(self.rate_hz, COMPUTED_HZ)
+        return min(self.rate_hz, self.most_hz)
+
+    def coarse(self, duration_s: float) -> World:
+        """The same for a drive of so much time, with at most `MOST_ROWS` rows."""
+        return replace(self, most_hz=min(self.most_hz, MOST_ROWS / max(duration_s, 1.0)))
 
     def driven(self, courses: Sequence[CourseCommands]) -> Drive:
         """A drive of courses, one a stage, all of one length."""
@@ -251,6 +257,11 @@ def whole_drive(
     return tuple(found), [joined(own) for own in parts]
 
 
+def steered_s(world: World, sequence: Sequence[LegTold]) -> float:
+    """Time of the legs with the turns between them, to the step that is steered."""
+    return whole_drive(world, sequence)[0][-1].to_s
+
+
 @dataclass(frozen=True, eq=False)
 class WholeDrive:
     """A whole drive with the information of all unknowns after each of its legs."""
@@ -261,6 +272,14 @@ class WholeDrive:
     after: tuple[Array, ...]
     slopes: Array
     noise: tuple[Structure, NoiseLevel]
+
+
+def whole_information(world: World, sequence: Sequence[LegTold]) -> Array:
+    """Information of all unknowns from all rows of the whole drive."""
+    _, courses = whole_drive(world, sequence)
+    view = world.view(world.driven(courses))
+    structure, level = world.noise(view)
+    return fisher(structure, level, world.columns(view))
 
 
 def outcome(world: World, sequence: Sequence[LegTold]) -> WholeDrive:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import Final
 
 from syncline_design.diagnosis.result import Diagnosis, Finding, NextDrive, Rival
 from syncline_design.effects import registry
-from syncline_design.machine.deadline import NoVerdict, within_s
+from syncline_design.machine.deadline import NoVerdict
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, to_places
+from syncline_design.planning.effort import Effort
 from syncline_design.planning.from_diagnosis import moves, sizes_of
 from syncline_design.planning.run import LONGEST_S, plan
 from syncline_design.planning.setup import SECONDS, PlanRequest
@@ -27,7 +28,10 @@ from syncline_design.planning.wanted import (
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput
 
-LIMIT_S: Final = 20.0  # of the command's time; without a plan by then, the diagnosis stands alone
+MOST_JUDGED: Final = (
+    8000  # drives that a diagnosis looks at by their legs; some 20 s of a processor
+)
+MOST_A_PLAN: Final = 4000  # of these for one plan
 MOST_TRIED: Final = 3
 
 
@@ -41,18 +45,33 @@ def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
     classes = list(_classes(found, len(case.stages) > 1))[:MOST_TRIED]
     untold: list[AliasClass] = []
     who, now = "This log" if found.joint is None else "These logs", None
+    looked = _Looked(Effort(MOST_JUDGED))
     try:
-        with within_s(LIMIT_S):
-            for now in classes:
-                drive = _told(case, now)
-                if drive is not None:
-                    return drive
-                untold.append(now)
+        for now in classes:
+            drive = _told(case, now, looked)
+            if drive is not None:
+                return drive
+            untold.append(now)
     except NoVerdict:
         return _none(case, now, _TOO_LATE.replace("{who}", who)) if now else None
     except (BadInput, PlanError) as error:
         return _none(case, now, f"No test drive could be planned, {error}") if now else None
-    return _none(case, untold[0], _untold_words(untold), untold[0].rivals) if untold else None
+    if not untold:
+        return None
+    words = _untold_words(untold, looked)
+    return _none(case, untold[0], words, untold[0].rivals, looked.alike_of(untold[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Looked:
+    """What a diagnosis has looked at: how much, and which pairs no drive can tell apart."""
+
+    effort: Effort
+    alike: list[str] = field(default_factory=list)
+
+    def alike_of(self, one: AliasClass) -> tuple[str, ...]:
+        """The rivals that are one with a finding on every leg."""
+        return tuple(r.text for r in one.rivals if f"{one.first.text} and {r.text}" in self.alike)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,60 +96,89 @@ class AliasClass:
         return replace(self, rivals=tuple(rivals))
 
 
-def _told(case: Case, one: AliasClass) -> NextDrive | None:
+def _told(case: Case, one: AliasClass, looked: _Looked) -> NextDrive | None:
     """The drive that tells a finding from all of its class that some drive tells it from.
 
-    Where none does in the minutes and in the time of a diagnosis, the one that tells it from the
-    commonest that can be told.  What would take longer than `LONGEST_S` is no drive.
+    Where none does in the minutes and with the effort of a diagnosis, the one that tells it from
+    the commonest that can be told.  What would take longer than `LONGEST_S` is no drive.
     """
     lost: list[NamedEffect] = []
     for rival in one.rivals[:MOST_TRIED]:
         commonest = one.only([rival])
-        run = _planned(case, commonest)
+        run = _planned(case, commonest, looked)
         least = run.result.least_minutes
         if least is not None and SECONDS * least <= LONGEST_S:
-            return _whole(case, one.only([r for r in one.rivals if r not in lost]), lost) or (
-                _short(case, run, commonest, lost)
-            )
+            rest = one.only([r for r in one.rivals if r not in lost])
+            return _whole(case, rest, lost, looked) or _short(case, run, commonest, lost, looked)
         lost.append(rival)
     return None
 
 
-def _whole(case: Case, one: AliasClass, lost: Sequence[NamedEffect]) -> NextDrive | None:
-    """The drive that tells a finding from several at once; None where there is none in time."""
+def _whole(
+    case: Case, one: AliasClass, lost: Sequence[NamedEffect], looked: _Looked
+) -> NextDrive | None:
+    """The drive that tells a finding from several at once; None where none is found."""
     if len(one.rivals) < 2:
         return None
     try:
-        run = _planned(case, one)
+        run = _planned(case, one, looked)
     except NoVerdict:
         return None
     more = [r for r in one.rivals if f"{one.first.text} and {r.text}" in run.result.inseparable]
     kept = one.only([r for r in one.rivals if r not in more])
-    return _short(case, run, kept, [*lost, *more]) if run.result.reached and kept.rivals else None
+    if not run.result.reached or not kept.rivals:
+        return None
+    return _short(case, run, kept, [*lost, *more], looked)
 
 
-def _planned(case: Case, one: AliasClass) -> PlanRun:
-    """The drive alone: nothing is said here of the field's line plans."""
-    return plan(case, PlanRequest(PlanWanted((), one.pairs), line_plans=False))
+def _planned(case: Case, one: AliasClass, looked: _Looked) -> PlanRun:
+    """The drive alone: nothing is said here of the field's line plans.
+
+    NoVerdict where the search ended before it came to one: none is known to be missing then.
+    """
+    own = looked.effort.part(MOST_A_PLAN)
+    run = plan(case, PlanRequest(PlanWanted((), one.pairs), line_plans=False, effort=own))
+    looked.effort.add(own)
+    looked.alike.extend(run.result.alike or ())
+    return run
 
 
 _TOO_LATE: Final = (
-    "{who} cannot tell {first} from {second}. No drive that does was found in the time that a "
-    "diagnosis gives it; this looks on"
+    "{who} cannot tell {first} from {second}. No drive that does was found among those that a "
+    "diagnosis looks at; this looks on"
 )
 
 
-def _untold_words(untold: Sequence[AliasClass]) -> str:
-    pairs = "; ".join(f"{one.first.text} from {r.text}" for one in untold for r in one.rivals)
-    most = format_duration(LONGEST_S)
-    return (
-        f"No test drive of this platform of up to {most} was found that tells {pairs}, at the size "
-        "that was found. What one shows"
-    )
+def _untold_words(untold: Sequence[AliasClass], looked: _Looked) -> str:
+    """That none can, where legs show none a difference; else that none was found."""
+    pairs = [(one.first.text, r.text) for one in untold for r in one.rivals]
+    alike = [pair for pair in pairs if " and ".join(pair) in looked.alike]
+    others = [pair for pair in pairs if pair not in alike]
+    words = []
+    if alike:
+        words.append(
+            f"No drive of this platform can tell {_from_words(alike)}: on every leg that it can "
+            "drive they make the same error"
+        )
+    if others:
+        most = format_duration(LONGEST_S)
+        words.append(
+            f"No test drive of this platform of up to {most} was found that tells "
+            f"{_from_words(others)}, at the size that was found"
+        )
+    return f"{'. '.join(words)}. What one shows"
+
+
+def _from_words(pairs: Sequence[tuple[str, str]]) -> str:
+    return "; ".join(f"{one} from {other}" for one, other in pairs)
 
 
 def _none(
-    case: Case, one: AliasClass, why: str, inseparable: Sequence[NamedEffect] = ()
+    case: Case,
+    one: AliasClass,
+    why: str,
+    inseparable: Sequence[NamedEffect] = (),
+    alike: Sequence[str] = (),
 ) -> NextDrive:
     """No drive, and the command that looks for it."""
     return NextDrive(
@@ -145,6 +193,7 @@ def _none(
         why_none=why.replace("{first}", one.first.text).replace("{second}", one.second),
         others=tuple(r.text for r in one.rivals[1:]) or None,
         inseparable=tuple(r.text for r in inseparable) or None,
+        alike=tuple(alike) or None,
     )
 
 
@@ -168,11 +217,13 @@ def _named(one: Finding | Rival, several: bool) -> NamedEffect:
     return NamedEffect(one.effect, one.sensor, one.stage if several else None)
 
 
-def _short(case: Case, run: PlanRun, one: AliasClass, lost: Sequence[NamedEffect]) -> NextDrive:
+def _short(
+    case: Case, run: PlanRun, one: AliasClass, lost: Sequence[NamedEffect], looked: _Looked
+) -> NextDrive:
     result = run.result
     command = _command(case, one)
     if not result.reached and result.least_minutes is not None:
-        command += ["--minutes", to_places(result.least_minutes * 1.05 + 0.1, 1)]
+        command += ["--minutes", to_places(result.least_minutes * 1.02 + 0.05, 1)]
     return NextDrive(
         first=one.first.text,
         second=one.rivals[0].text,
@@ -184,4 +235,5 @@ def _short(case: Case, run: PlanRun, one: AliasClass, lost: Sequence[NamedEffect
         command=shlex.join(command),
         others=tuple(r.text for r in one.rivals[1:]) or None,
         inseparable=tuple(r.text for r in lost) or None,
+        alike=looked.alike_of(one.only(lost)) or None,
     )

@@ -126,7 +126,8 @@ class Plan(Record):
     priors: standard deviations before the drive, SI.  assumed: figures of the platform that the
     spec does not state.  surveyed: whether the targets were there already, and the drive is laid
     beside them.  sized: whether pairs are judged at a size that is known, beyond first order.
-    cautions: where what the plan was given may not be of this system.
+    cautions: where what the plan was given may not be of this system.  alike: of the inseparable
+    ones those that make the same error on every leg that this platform can drive.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -155,6 +156,7 @@ class Plan(Record):
     flown: Flown | None = optional()
     sized: bool | None = optional()
     cautions: tuple[str, ...] | None = optional()
+    alike: tuple[str, ...] | None = optional()
 
     @property
     def exit_code(self) -> int:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Final
 
-from syncline_design.machine.deadline import in_force
+from syncline_design.machine.deadline import NoVerdict, in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
-from syncline_design.planning.drives import WholeDrive, outcome
+from syncline_design.planning.drives import WholeDrive, outcome, steered_s
+from syncline_design.planning.effort import Effort
+from syncline_design.planning.enough import shortest
 from syncline_design.planning.placing import AREA_SHARE, LegTold, lasting_s, way_of
-from syncline_design.planning.search import LegSearch, best_legs, together
+from syncline_design.planning.search import LegSearch, best_within, together
 from syncline_design.planning.setup import SECONDS, PlanRequest, Setup
 from syncline_design.planning.standard import times_needed
 from syncline_design.planning.telling import PlanRun, Telling, duration_s
@@ -20,6 +22,7 @@ from syncline_design.planning.wanted import (
 from syncline_design.spec.case import Case
 
 LONGEST_S: Final = 4 * 3600.0  # of a drive that is looked for to say the least minutes
+ROWS_OF_A_DRIVE: Final = 50  # that take as long to look at as a drive by its legs
 SEARCH_SHARE: Final = 0.5  # of the command's time
 
 
@@ -27,7 +30,8 @@ def plan(case: Case, request: PlanRequest | None = None) -> PlanRun:
     """The drive that tells what is asked.
 
     Raises BadInput for a spec that cannot be used, PlanError for a request that cannot be met at
-    all; what cannot be reached in the minutes is a result.
+    all, NoVerdict for a search that ended before it came to a drive; what cannot be reached in the
+    minutes is a result.
     """
     with one_thread():
         return _Planning(Setup.begun(case, request or PlanRequest())).run()
@@ -44,11 +48,18 @@ class _Planning:
         in_force().doing("searching for legs")
         limit = in_force().left_s()
         deadline = in_force().inner(None if limit is None else SEARCH_SHARE * limit)
-        search = LegSearch(self.setup.told, self.setup.judge, deadline, self._area())
-        chosen, whole = best_legs(search, most_s, max(LONGEST_S, most_s))
+        effort = Effort() if self.setup.request.effort is None else self.setup.request.effort
+        effort.begun += self.setup.rows / ROWS_OF_A_DRIVE
+        search = LegSearch(self.setup.told, self.setup.judge, deadline, self._area(), effort)
+        whole = shortest(self.setup, search, max(LONGEST_S, most_s))
+        search = search.at(whole.margin)
+        if search.is_over and not search.reaches(whole.legs):
+            raise NoVerdict("the search ended before it came to a drive that tells what is asked")
+        enough = search.reaches(whole.legs) and steered_s(self.setup.world, whole.legs) <= most_s
+        chosen = whole.legs if enough else best_within(search, most_s)
         in_force().doing("looking at the whole drive")
         chosen, found = self._judged(search, chosen, most_s)
-        least_s = self._least_s(found, whole, most_s)
+        least_s = self._least_s(search, found, whole.legs, most_s)
         return Telling(self.setup).whole(found, least_s, most_s)
 
     def _area(self) -> tuple[float, float] | None:
@@ -93,12 +104,13 @@ class _Planning:
             return None
         return min(trials, key=lambda trial: search.value(trial)[1])[-1]
 
-    def _least_s(self, found: WholeDrive, whole: list[LegTold], most_s: float) -> float | None:
-        """The least time that reaches all: this drive's, a longer one's, or so many of its kind."""
+    def _least_s(
+        self, search: LegSearch, found: WholeDrive, whole: list[LegTold], most_s: float
+    ) -> float | None:
+        """The least time that reaches all: this drive's, a longer one's, or so much of its kind."""
         if self.setup.reached(found) and duration_s(found) <= most_s:
             return duration_s(found)
-        search = LegSearch(self.setup.told, self.setup.judge, in_force())
         if search.reaches(whole):
-            return max(lasting_s(whole), 1.001 * most_s)
+            return max(steered_s(self.setup.world, whole), 1.001 * most_s)
         needed = times_needed(self.setup.judge, together(whole))
-        return None if needed is None else needed * lasting_s(whole)
+        return None if needed is None else max(needed * lasting_s(whole), 1.001 * most_s)

@@ -9,7 +9,9 @@ Source: Fedorov, Theory of Optimal Experiments (1972), for exchange.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import field, replace
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import Deadline
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.planning.effort import Effort
 from syncline_design.planning.information import (
     Unknown,
     canonical_correlation,
@@ -26,13 +29,13 @@ from syncline_design.planning.information import (
     schur,
     sigmas,
 )
-from syncline_design.planning.placing import LegTold, Place, arranged, lasting_s, way_of
+from syncline_design.planning.placing import LegTold, Place, Placed, arranged, lasting_s, way_of
 from syncline_design.planning.wanted import Goal, PairGoal
 
 NONCENTRALITY: Final = 60.0  # at which a rival fits worse by more than 15 nat nine times in ten
 SAME: Final = 0.99  # correlation above which two effects stay one class
 MOST_LEGS: Final = 240
-MARGIN: Final = 0.95  # of what is asked that the search aims at, for the joints between legs
+MARGIN: Final = 0.95  # of what is asked that a search aims at first, for the joints between legs
 LEAST_GAIN: Final = 1e-4
 SWEEPS: Final = 3
 MOST_EXCHANGED: Final = 12
@@ -140,23 +143,35 @@ class PlanJudge:
         beyond = np.any(self._shares(information) > 1.0, axis=1)
         return [int(k) for k in self.others.index[beyond, 0]]
 
-    def loss(self, information: Array) -> float:
-        """Sum of the logarithms of what is not reached, the worst twice; 0 where all is reached.
-
-        What any one other effect, left free, takes of it counts like what is asked.
-        """
-        every = np.concatenate([self.ratios(information), self.confusions(information)])
-        logs = np.log(np.maximum(every / MARGIN, 1.0))
-        return float(np.sum(logs) + np.max(logs)) if logs.size else 0.0
-
-    def value(self, information: Array) -> tuple[float, float]:
-        """What is not reached, and the same with what all other effects together take of it."""
+    def standing(self, information: Array) -> Standing:
+        """How far a plan is from all that is asked; what any one other effect, left free, takes of
+        it counts like what is asked."""
         index = list(self.goal.wanted)
-        loss = self.loss(information)
+        every = np.concatenate([self.ratios(information), self.confusions(information)])
         alone = sigmas(information, index, VAGUE * self.prior[index])
         whole = sigmas(information, range(len(self.prior)), self.prior)[index]
-        taken = float(np.mean(np.log(np.maximum(whole / alone, 1.0))))
-        return loss, loss + CONFUSED * taken
+        return Standing(every, float(np.mean(np.log(np.maximum(whole / alone, 1.0)))))
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How far a plan is from what is asked: a ratio for every wish, 1 and below where it is met.
+
+    taken: by how much all other effects together widen what is wanted, its mean logarithm.
+    """
+
+    every: Array
+    taken: float
+
+    def loss(self, margin: float) -> float:
+        """Sum of the logarithms of what is not reached, the worst twice; 0 where all is reached."""
+        logs = np.log(np.maximum(self.every / margin, 1.0))
+        return float(np.sum(logs) + np.max(logs)) if logs.size else 0.0
+
+    def value(self, margin: float) -> tuple[float, float]:
+        """What is not reached, and the same with what all other effects together take of it."""
+        loss = self.loss(margin)
+        return loss, loss + CONFUSED * self.taken
 
 
 def pair_ratio(information: Array, pair: PairGoal) -> float:
@@ -196,28 +211,57 @@ def told_from(information: Array, pair: PairGoal) -> Array | None:
 
 @dataclass(slots=True)
 class LegSearch:
-    """A search over legs for a judge; where the time is over it stops with what it has."""
+    """A search over legs for a judge; where time or effort are over it stops with what it has.
+
+    margin: of what is asked that it aims at.  known: how sequences of legs stand, by `key`: they
+    stand alike whatever the margin, and are judged once.
+    """
 
     legs: tuple[LegTold, ...]
     judge: PlanJudge
     deadline: Deadline
     area_m: Place | None = None
+    effort: Effort = field(default_factory=Effort)
+    margin: float = MARGIN
+    known: dict[tuple[int, ...], Standing] = field(default_factory=dict)
+
+    def at(self, margin: float) -> LegSearch:
+        """The same search with another margin."""
+        return replace(self, margin=margin)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has to do with what it has."""
+        return self.deadline.is_over or self.effort.is_over
+
+    def key(self, sequence: Sequence[LegTold]) -> tuple[int, ...]:
+        """Which legs, in which order."""
+        return tuple(map(id, sequence))
 
     def fits(self, sequence: Sequence[LegTold]) -> bool:
         """Whether the legs and the turns between them stay within the area."""
         return self.area_m is None or way_of(sequence).within(self.area_m)
 
+    def standing(self, key: tuple[int, ...], information: Callable[[], Array]) -> Standing:
+        """How some legs stand; information: what they tell together."""
+        found = self.known.get(key)
+        if found is None:
+            found = self.known[key] = self.judge.standing(information())
+            self.effort.spent += 1
+        return found
+
     def value(self, sequence: Sequence[LegTold]) -> tuple[float, float]:
-        return self.judge.value(together(sequence))
+        found = self.standing(self.key(sequence), lambda: together(sequence))
+        return found.value(self.margin)
 
     def reaches(self, sequence: Sequence[LegTold]) -> bool:
-        return bool(sequence) and self.judge.loss(together(sequence)) <= 0.0
+        return bool(sequence) and self.value(sequence)[0] <= 0.0
 
     def grown(self, begun: Sequence[LegTold], most_s: float) -> list[LegTold]:
         """Legs added one by one, each the best for its time, until all is reached."""
         plan = list(begun)
         loss, value = self.value(plan) if plan else (math.inf, 0.0)
-        while loss > 0.0 and len(plan) < MOST_LEGS and not self.deadline.is_over:
+        while loss > 0.0 and len(plan) < MOST_LEGS and not self.is_over:
             found = self._next(plan, value, most_s)
             if found is None:
                 break
@@ -231,12 +275,13 @@ class LegSearch:
         self, plan: list[LegTold], value: float, most_s: float
     ) -> tuple[LegTold, float, float] | None:
         best: tuple[float, LegTold, float, float] | None = None
-        way, known = way_of(plan), together(plan)
+        way, known, key = way_of(plan), _Once(plan), self.key(plan)
         for told in self.legs:
             placed, after = way.then(told)
             if after.end_s > most_s or not after.within(self.area_m):
                 continue
-            loss, worse = self.judge.value(known + told.at(placed.heading, placed.start_s))
+            more = partial(known.then, placed)
+            loss, worse = self.standing((*key, id(told)), more).value(self.margin)
             worth = (value - worse) / (after.end_s - way.end_s)
             if best is None or worth > best[0]:
                 best = (worth, told, loss, worse)
@@ -258,7 +303,7 @@ class LegSearch:
         return [plan[:k] + plan[k + 1 :] for k in range(len(plan))]
 
     def _exchanged(self, plan: list[LegTold]) -> list[list[LegTold]]:
-        if self.deadline.is_over:
+        if self.is_over:
             return []
         return [
             [*plan[:k], told, *plan[k + 1 :]]
@@ -279,46 +324,66 @@ class LegSearch:
         return plan
 
 
-def best_legs(
-    search: LegSearch, most_s: float, whole_s: float
-) -> tuple[list[LegTold], list[LegTold]]:
-    """The plan for at most so much time, and the one that reaches all, however long it takes."""
-    whole = _begun_anyhow(search, whole_s)
-    if search.reaches(whole) and lasting_s(whole) <= most_s:
-        return whole, whole
+class _Once:
+    """What some legs tell together, added up once it is asked for."""
+
+    def __init__(self, plan: Sequence[LegTold]) -> None:
+        self._plan = plan
+
+    @cached_property
+    def _known(self) -> Array:
+        return together(self._plan)
+
+    def then(self, placed: Placed) -> Array:
+        """With one more leg."""
+        return np.asarray(self._known + placed.told.at(placed.heading, placed.start_s))
+
+
+def best_within(search: LegSearch, most_s: float) -> list[LegTold]:
+    """The plan for at most so much time."""
     plan = search.grown([], most_s)
     if not plan:  # not one leg fits: the shortest shows what it would take
         fitting = [told for told in search.legs if search.fits([told])] or search.legs
-        return [min(fitting, key=lambda told: lasting_s([told]))], whole
-    if not search.reaches(plan):
-        plan = search.bettered(plan, most_s)
-    return plan, whole
+        return [min(fitting, key=lambda told: lasting_s([told]))]
+    return plan if search.reaches(plan) else search.bettered(plan, most_s)
 
 
-def _begun_anyhow(search: LegSearch, most_s: float) -> list[LegTold]:
-    """The shortest that reaches all of what begins with the leg that tells most for its time, and
-    of what begins with any other: what is best for its time first is not always best together."""
+def reaching(search: LegSearch, most_s: float) -> list[list[LegTold]]:
+    """Drives that reach all, the shortest first; none where none was found.
+
+    Begun with the leg that tells most for its time, and with any other: what is best for its time
+    first is not always best together.
+    """
     best = search.grown([], most_s)
     if not search.reaches(best):
-        return best
-    best = search.shortened(best)
-    if len(best) > MOST_EXCHANGED:  # what is first hardly matters, and takes long
-        return search.bettered(best, lasting_s(best) + 1e-6)
+        return []
+    found = [search.shortened(best)]
+    if len(found[0]) <= MOST_EXCHANGED:  # beyond, what is first hardly matters, and takes long
+        found += _begun_anyhow(search, lasting_s(found[0]))
+        found += _two_legs(search, min(map(lasting_s, found)))
+    found.sort(key=lasting_s)
+    better = search.bettered(found[0], lasting_s(found[0]) + 1e-6)
+    return [better, *found] if search.reaches(better) else found
+
+
+def _begun_anyhow(search: LegSearch, most_s: float) -> list[list[LegTold]]:
+    """What begins with any leg, each shorter than those before it."""
+    found: list[list[LegTold]] = []
     for told in search.legs:
-        if search.deadline.is_over:
-            return best
-        if lasting_s([told]) >= lasting_s(best) or not search.fits([told]):
+        if search.is_over:
+            break
+        if lasting_s([told]) >= most_s or not search.fits([told]):
             continue
-        found = search.grown([told], lasting_s(best))
-        if search.reaches(found):
-            best = min(best, search.shortened(found), key=lasting_s)
-    best = _two_legs(search, best)
-    return search.bettered(best, lasting_s(best) + 1e-6)
+        begun = search.grown([told], most_s)
+        if search.reaches(begun):
+            found.append(search.shortened(begun))
+            most_s = min(most_s, lasting_s(found[-1]))
+    return found
 
 
-def _two_legs(search: LegSearch, best: list[LegTold]) -> list[LegTold]:
-    """The shortest of all drives of two legs where it is shorter still."""
+def _two_legs(search: LegSearch, below_s: float) -> list[list[LegTold]]:
+    """The shortest of all drives of two legs that reach all in less time; none where none does."""
     pairs = [[one, other] for one in search.legs for other in search.legs]
     timed = sorted(((lasting_s(pair), pair) for pair in pairs), key=lambda one: one[0])
-    shorter = (pair for lasts_s, pair in timed if lasts_s < lasting_s(best))
-    return next((p for p in shorter if search.fits(p) and search.reaches(p)), best)
+    shorter = (pair for lasts_s, pair in timed if lasts_s < below_s)
+    return [p for p in shorter if search.fits(p) and search.reaches(p)][:1]

@@ -19,6 +19,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.planning.beyond import BeyondFirst, beyond_first
 from syncline_design.planning.drives import WholeDrive, World
+from syncline_design.planning.effort import Effort
 from syncline_design.planning.fixed_targets import FixedTargets
 from syncline_design.planning.from_diagnosis import asked_of
 from syncline_design.planning.information import (
@@ -30,10 +31,11 @@ from syncline_design.planning.information import (
 from syncline_design.planning.legs import Leg
 from syncline_design.planning.path import joined
 from syncline_design.planning.placing import LegTold
-from syncline_design.planning.search import PlanJudge, others_of, pair_ratio
+from syncline_design.planning.search import PlanJudge, noncentrality_of, others_of, pair_ratio
 from syncline_design.planning.vehicle import vehicles
 from syncline_design.planning.wanted import (
     Goal,
+    PairGoal,
     PlanError,
     PlanWanted,
     goal_of,
@@ -46,6 +48,7 @@ NOTHING_ASKED: Final = PlanWanted()
 DEFAULT_HZ: Final = 10.0
 SECONDS: Final = 60.0
 BEST_LEGS: Final = 5.0  # times as much as all legs on average, in the same time
+SAME_ERROR: Final = 1e-18  # of the information on an effect: what rounding leaves of none
 MOST_OF_ALL: Final = 1e4  # times all legs: what that does not tell apart, no drive does
 
 
@@ -54,6 +57,7 @@ class PlanRequest:
     """What a plan is asked for; none of all: a commissioning drive.
 
     targets: those that are surveyed already.  line_plans: whether the field's are judged beside it.
+    effort: what the search may look at; None: whatever it takes.
     """
 
     asked: PlanWanted = NOTHING_ASKED
@@ -63,6 +67,7 @@ class PlanRequest:
     seed: int = 0
     targets: FixedTargets | None = None
     line_plans: bool = True
+    effort: Effort | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +81,7 @@ class Setup:
     judge: PlanJudge
     told: tuple[LegTold, ...]
     inseparable: tuple[str, ...]
+    alike: tuple[str, ...]
 
     @classmethod
     def begun(cls, case: Case, request: PlanRequest) -> Setup:
@@ -94,9 +100,10 @@ class Setup:
         told = world.looked_at(_legs_of(world, goal))
         library = np.sum([t.at(h, SECONDS * h) for t in told for h in range(4)], axis=0)
         share = BEST_LEGS * SECONDS * request.minutes / (4.0 * sum(t.leg.duration_s for t in told))
+        alike = tuple(_words(p) for p in goal.pairs if _is_one(library, p))
         goal, apart = _separable(goal, library, share)
         others = others_of(world.every, goal, library, prior)
-        return cls(case, request, world, goal, PlanJudge(goal, prior, others), told, apart)
+        return cls(case, request, world, goal, PlanJudge(goal, prior, others), told, apart, alike)
 
     @property
     def system(self) -> System:
@@ -107,6 +114,11 @@ class Setup:
     def keys(self) -> tuple[str, ...]:
         """Names of all unknowns."""
         return keys_of(self.system, self.world.every)
+
+    @property
+    def rows(self) -> float:
+        """Rows that were looked at: of all legs, at four headings."""
+        return 4.0 * self.world.computed_hz * sum(told.leg.duration_s for told in self.told)
 
     def reached(self, found: WholeDrive) -> bool:
         """Whether a drive tells all that is asked, whatever it takes."""
@@ -187,6 +199,20 @@ def _beyond_first(
     return replace(goal, pairs=tuple(pairs)), tuple(found)
 
 
+def _is_one(information: Array, pair: PairGoal) -> bool:
+    """Whether two effects make the same error on all legs, whatever the second's parameters have
+    to be: said of a known size alone, of which the errors themselves are compared."""
+    if pair.beyond is None:
+        return False
+    own = float(pair.sizes @ information[np.ix_(pair.first, pair.first)] @ pair.sizes)
+    return noncentrality_of(information, pair) < SAME_ERROR * own
+
+
+def _words(pair: PairGoal) -> str:
+    """A pair by its effects' names."""
+    return " and ".join(pair.names)
+
+
 def _separable(goal: Goal, library: Array, share: float) -> tuple[Goal, tuple[str, ...]]:
     """The goal without further pairs that no drive tells apart, and these in words.
 
@@ -198,10 +224,10 @@ def _separable(goal: Goal, library: Array, share: float) -> tuple[Goal, tuple[st
     for pair in goal.pairs:
         most = share if pair.beyond is not None and len(goal.pairs) > 1 else MOST_OF_ALL
         if pair_ratio(min(most, MOST_OF_ALL) * library, pair) > 1.0:
-            apart.append(f"{pair.names[0]} and {pair.names[1]}")
+            apart.append(_words(pair))
         elif pair not in kept:
             kept.append(pair)
-    if len(kept) > 1 and apart and apart[0] == " and ".join(goal.pairs[0].names):
+    if len(kept) > 1 and apart and apart[0] == _words(goal.pairs[0]):
         kept = kept[1:]
     wanted = set(goal.wanted)
     if goal.pairs and kept and kept[0] is not goal.pairs[0]:

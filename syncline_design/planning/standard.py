@@ -33,6 +33,7 @@ ROUNDS: Final[dict[str, tuple[tuple[str, tuple[int, ...]], ...]]] = {
     "patch-test lines": ((LINE, (0, 2)), (SLOW, (0,)), (LINE, (2,))),
 }
 MOST_LEGS: Final = 2**16
+PART: Final = 0.002  # of a drive that is driven several times, to which its time is told
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +169,14 @@ def most_within(holds: Callable[[int], bool]) -> int:
     return low
 
 
-def times_needed(judge: PlanJudge, information: Array) -> int | None:
-    """How many times a drive has to be driven until all is reached; None: however often."""
+def times_needed(judge: PlanJudge, information: Array) -> float | None:
+    """How many times a drive has to be driven until all is reached, the last one in part; None:
+    however often."""
     before = most_within(lambda count: not reached(judge, count * information))
-    return None if before >= MOST_LEGS else before + 1
+    if before >= MOST_LEGS:
+        return None
+    low, high = float(before), float(before + 1)
+    while high - low > PART * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if reached(judge, middle * information) else (middle, high)
+    return high

@@ -108,6 +108,7 @@ class Telling:
             tolerance=self._tolerance(),
             pairs=tuple(self._separated(found.after[-1], p) for p in self.setup.goal.pairs),
             inseparable=self.setup.inseparable,
+            alike=self.setup.alike or None,
             confused=self._confused(found.after[-1]),
             unseen=self._unseen(found.after[-1]),
             columns=columns_needed(self.setup.system),

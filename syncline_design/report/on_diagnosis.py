@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Final
 
@@ -10,6 +11,7 @@ from syncline_design.diagnosis.gap_result import Gap
 from syncline_design.diagnosis.result import (
     Diagnosis,
     LogRead,
+    NextDrive,
 )
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
@@ -108,12 +110,21 @@ def _drive(found: Diagnosis) -> list[Node]:
     targets = f", over {plan.targets} surveyed targets" if plan.targets else ""
     more = f"Whole, with waypoints{targets}: "
     nodes: list[Node] = [Text(words), Items(plan.legs), Text((more, code(plan.command)))]
-    if plan.inseparable:
-        lost = sentence_list(list(plan.inseparable))
-        nodes.append(
-            Text(f"No drive of this platform tells it from {lost} in ten minutes, at this size.")
-        )
+    nodes += [Text(words) for words in _untold(plan)]
     return nodes
+
+
+def _untold(plan: NextDrive) -> Iterator[str]:
+    """What the drive does not tell the finding from."""
+    alike = [one for one in plan.inseparable or () if one in (plan.alike or ())]
+    lost = [one for one in plan.inseparable or () if one not in alike]
+    if alike:
+        yield f"No drive of this platform can tell it from {sentence_list(alike)}."
+    if lost:
+        yield (
+            f"No drive of this platform tells it from {sentence_list(lost)} in ten minutes, at "
+            "this size."
+        )
 
 
 def _unseen(found: Diagnosis) -> list[Node]:

@@ -144,13 +144,21 @@ def _apart(found: Finding, aliases: Sequence[Rival], drive: NextDrive | None) ->
 
     In one voice with the drive below: where that is none, no manoeuvre is promised here.
     """
+    driven = [one for one in aliases if moves(one.effect)]
+    if drive is not None and drive.first in _spelt(found) and _among(driven, drive.alike):
+        return "No drive can: on every leg of this platform they make the same error."
     if drive is not None and drive.minutes is None:
         return "No drive that does was found."
     lost = drive.inseparable or () if drive is not None and drive.first in _spelt(found) else ()
-    driven = [one for one in aliases if moves(one.effect)]
-    if lost and driven and all(any(name in lost for name in _spelt(one)) for one in driven):
+    if _among(driven, lost):
         return "No drive of this platform does in ten minutes, at this size."
     return f"To separate them: {found.separated_by}."
+
+
+def _among(aliases: Sequence[Rival], names: Sequence[str] | None) -> bool:
+    """Whether all of some aliases are named."""
+    known = names or ()
+    return bool(aliases) and all(any(name in known for name in _spelt(one)) for one in aliases)
 
 
 def _spelt(one: Finding | Rival) -> tuple[str, str]:

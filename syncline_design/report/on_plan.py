@@ -38,6 +38,7 @@ UNITS: Final = {
 }  # fmt: skip
 Row = tuple[Cell | str, ...]
 FIRST_ORDER: Final = "as far as their effects of first order go"  # a large lag is no latency
+ONE: Final = "on every leg that it can drive they make the same error"
 AT_SIZE: Final = "at the size that is known, in these minutes"
 MOST_TARGETS: Final = 12  # told outside the page
 
@@ -84,7 +85,7 @@ def _outcome(found: Plan) -> Outcome:
 
 def _sentences(found: Plan) -> Iterator[Inline]:
     if not found.reached and found.least_minutes is not None:
-        least = _minutes(_upwards(found.least_minutes))
+        least = _least(found.least_minutes)
         given = f"{numbers.number(found.minutes, 6)} min"
         below = f"Below is the best for {given}."
         if found.duration_s > 60.0 * found.minutes:
@@ -95,6 +96,8 @@ def _sentences(found: Plan) -> Iterator[Inline]:
         larger = _larger(found)
         if larger is not None and words == f"{larger.first} and {larger.second}":
             yield from _told_where_larger(larger)
+        elif words in (found.alike or ()):
+            yield f"No drive of this platform can tell {words} apart: {ONE}."
         else:
             yield f"No drive of this platform tells {words} apart, {_how_far(found)}."
     if found.reached and not found.confused:
@@ -147,10 +150,11 @@ def _minutes(minutes: float) -> str:
     )
 
 
-def _upwards(minutes: float) -> float:
-    """Minutes to two figures, never too few."""
-    scale = 10.0 ** (math.floor(math.log10(max(minutes, 1e-9))) - 1)
-    return math.ceil(minutes / scale - 1e-9) * scale
+def _least(minutes: float) -> str:
+    """Minutes to three figures, never too few: `36.9 min`, `11.3 h`."""
+    value, unit = (minutes / 60.0, "h") if minutes >= 600.0 else (minutes, "min")
+    scale = 10.0 ** (math.floor(math.log10(max(value, 1e-9))) - 2)
+    return numbers.typeset(f"{numbers.number(math.ceil(value / scale - 1e-9) * scale, 3)} {unit}")
 
 
 def _facts(found: Plan) -> Iterator[tuple[str, str]]:
@@ -315,7 +319,9 @@ def _open(found: Plan) -> list[Node]:
         nodes.append(
             Items(
                 tuple(
-                    f"{one}: no drive tells them apart, {_how_far(found)}"
+                    f"{one}: no drive can tell them apart, {ONE}"
+                    if one in (found.alike or ())
+                    else f"{one}: no drive tells them apart, {_how_far(found)}"
                     for one in found.inseparable
                 )
             )

@@ -1,0 +1,108 @@
+"""The shortest drive that is enough, by what whole drives tell.
+
+The search adds up what legs tell alone.  Turns between them tell more, joints and other targets
+less, so that what it aims at (its margin) is not what the drive reaches: that is judged whole, and
+the margin is moved by how far it was off, until the drive is enough and hardly more.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import field
+from typing import Final
+
+from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.planning.drives import whole_information
+from syncline_design.planning.placing import LegTold, lasting_s
+from syncline_design.planning.search import LegSearch, reaching
+from syncline_design.planning.setup import Setup
+
+AIM: Final = 0.993  # of what is asked that a drive is to reach
+CLOSE: Final = 0.985  # of what is asked: from there on a drive tells hardly more
+TRIED: Final = 5  # margins
+MOST_JUDGED: Final = 24  # drives that are judged whole
+ALIKE: Final = 0.003  # by which two margins differ that are as good as one
+
+
+@dataclass(frozen=True, slots=True)
+class Shortest:
+    """The shortest drive found that reaches all, and the margin with which it was searched.
+
+    judged: whether it was enough when it was judged whole; without, the search alone says so, or
+    nothing reaches all.
+    """
+
+    legs: list[LegTold]
+    margin: float
+    judged: bool
+
+
+def shortest(setup: Setup, search: LegSearch, most_s: float) -> Shortest:
+    """The shortest drive of at most so much time that is enough."""
+    tried, whole = _Margins(search.margin), _Whole(setup)
+    found: list[list[LegTold]] = []
+    for _ in range(TRIED):
+        drives = reaching(search.at(tried.now), most_s)
+        if not drives:
+            break
+        found += drives
+        if not tried.moved(whole.worst(drives[0])) or search.is_over:
+            break
+    if not found:
+        return Shortest(search.grown([], most_s), search.margin, judged=False)
+    enough = whole.first_enough(sorted(found, key=lasting_s))
+    return Shortest(enough or found[0], tried.passed or search.margin, enough is not None)
+
+
+@dataclass(slots=True)
+class _Margins:
+    """The margin to search with, and between which the drive is that is just enough."""
+
+    now: float
+    passed: float = 0.0
+    failed: float = math.inf
+
+    def moved(self, worst: float) -> bool:
+        """Move by how the drive found now did; whether another is worth a search."""
+        if worst <= 1.0:
+            self.passed = max(self.passed, self.now)
+        else:
+            self.failed = min(self.failed, self.now)
+        if CLOSE <= worst <= 1.0 or self.failed <= self.passed:
+            return False
+        before, self.now = self.now, self.now * AIM / worst
+        if not self.passed < self.now < self.failed:
+            self.now = math.sqrt(self.passed * self.failed)
+        return abs(math.log(self.now / before)) >= ALIKE
+
+
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    """What drives judged whole reach of what is asked, each judged once."""
+
+    setup: Setup
+    known: dict[tuple[int, ...], float] = field(default_factory=dict)
+
+    def worst(self, legs: list[LegTold]) -> float:
+        """1 and below where it is enough."""
+        key = tuple(map(id, legs))
+        if key not in self.known:
+            in_force().check()
+            world = self.setup.world.coarse(lasting_s(legs))
+            information = whole_information(world, legs)
+            ratios = self.setup.judge.ratios(information, exact=True)
+            every = [*ratios, *self.setup.judge.confusions(information)]
+            self.known[key] = float(max(every, default=0.0))
+        return self.known[key]
+
+    def first_enough(self, drives: Sequence[list[LegTold]]) -> list[LegTold] | None:
+        """The first that is enough, of as many as may be judged."""
+        for legs in drives:
+            new = tuple(map(id, legs)) not in self.known
+            if new and len(self.known) >= MOST_JUDGED:
+                continue
+            if self.worst(legs) <= 1.0:
+                return legs
+        return None
