@@ -28,9 +28,7 @@ from syncline_design.planning.wanted import (
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput
 
-MOST_JUDGED: Final = (
-    8000  # drives that a diagnosis looks at by their legs; some 20 s of a processor
-)
+MOST_JUDGED: Final = 8000  # drives that a diagnosis looks at: some 20 s of a processor
 MOST_A_PLAN: Final = 4000  # of these for one plan
 MOST_TRIED: Final = 3
 
