@@ -66,7 +66,7 @@ def test_packets_whose_messages_are_read_one_after_the_other_are_packets_and_no_
     assert one.residual.bound == pytest.approx(np.ptp(noted - true), rel=0.15)
 
 
-@pytest.mark.parametrize("rate_hz", [20.0, 47.3, 125.0, 200.0, 333.0, 400.0])
+@pytest.mark.parametrize("rate_hz", [20.0, 47.3, 50.0, 62.5, 125.0, 200.0, 333.0, 400.0])
 def test_frames_of_usb_that_threads_noted_are_no_steps_and_no_drift(rate_hz: float) -> None:
     """Receipts scatter over a frame of 1 ms, so stamps on arrival are not named, but their frames
     are said and counted; the sensor's clock moves over two frames."""
@@ -79,6 +79,19 @@ def test_frames_of_usb_that_threads_noted_are_no_steps_and_no_drift(rate_hz: flo
     assert one.hidden is not None
     assert one.residual.bound is not None
     assert one.residual.bound + one.hidden.seconds > 0.9 * np.ptp(noted - true)
+
+
+@pytest.mark.parametrize(("rate_hz", "ppm", "seed"), [(62.5, -12.0, 1), (125.0, 12.0, 8)])
+def test_one_edge_of_a_frame_is_no_step_where_the_interval_holds_longer_ticks_too(
+    rate_hz: float, ppm: float, seed: int
+) -> None:
+    """A clock 12 ppm off passes one edge of a frame of 1 ms within the log; receipts scatter over
+    the frame, by chance as a step does."""
+    rng = np.random.default_rng(seed)
+    true = 4.5e-4 + np.arange(int(75.0 * rate_hz)) / rate_hz * (1.0 + 1e-6 * ppm)
+    stamp = np.ceil(true / 1e-3) * 1e-3 + 1e-4 + rng.gamma(2.0, 2e-5, true.size)
+    assert np.sum(np.abs(np.diff(stamp) - 1.0 / rate_hz) > 5e-4) == 1
+    assert named(audited(stamp, stamp + 2e-4 + rng.uniform(0.0, 1e-3, true.size))) == []
 
 
 @pytest.mark.parametrize(("rate_hz", "timer_s"), [(62.5, 0.016), (125.0, 0.008)])

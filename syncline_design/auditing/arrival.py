@@ -136,7 +136,9 @@ def frame_of(series: Series) -> float:
     if series.receive is None or places.size < 2:
         return 0.0
     found = framed(seconds(series.stamp[places] - series.stamp[places[0]]))
-    return found.frame_s if found is not None and found.frame_s <= max(FRAMES_S) else 0.0
+    if found is None:
+        return 0.0
+    return found.frame_s if found.frame_s <= max(FRAMES_S) else FULL_SPEED_S  # or of longer ticks
 
 
 def _hidden_frame(found: Framed) -> Hidden:
