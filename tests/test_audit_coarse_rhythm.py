@@ -177,3 +177,17 @@ def test_packets_of_pairs_whose_median_interval_is_of_neither_kind(apart_s: floa
     stamp = np.stack([heads, heads + apart_s], axis=1).ravel()[:-1]
     receive = np.maximum.accumulate(stamp + 1e-3 + rng.gamma(2.0, 5e-5, stamp.size))
     assert set(named(of(stamp, receive))) == {"packetised"}
+
+
+@pytest.mark.parametrize(("rate", "grid", "ppm"), [(130.0, 0.01, 300.0), (37.0, 0.1, -200.0)])
+def test_equal_stamps_of_a_grid_do_not_go_back_beside_a_drift(
+    rate: float, grid: float, ppm: float
+) -> None:
+    rng = generator((29, int(rate)))
+    when = (rng.uniform() + np.arange(int(90.0 * rate))) / rate
+    stamp = np.floor(when * (1.0 + 1e-6 * ppm) / grid) * grid
+    assert np.all(np.diff(stamp) >= 0.0)
+    late = 2e-3 + rng.gamma(2.0, 1.5e-3, when.size)
+    faults = named(of(stamp, np.maximum.accumulate(when + late)))
+    assert set(faults) == {"truncated_stamps", "drift"}
+    assert faults["drift"].parameters["ppm"] == pytest.approx(ppm, abs=5.0)

@@ -253,11 +253,15 @@ def _with_partner(late: NDArray[np.float64], span: slice) -> slice:
     return slice(span.start - 1, span.stop) if moved > 0.6 * away else span
 
 
-def remaining_falls(series: Series) -> StampFault | None:
-    """Stamps that went back and stayed behind, where no other cause was found."""
+def remaining_falls(shifted: Series, series: Series) -> StampFault | None:
+    """Stamps that went back and stayed behind, where no other cause was found.
+
+    Only those that go back with their shifts (`shifted`) too: a drift is taken off by receipts, by
+    which equal stamps of a grid seem to go back.
+    """
     places = series.places()
     change = np.diff(series.stamp[places])
-    falls = np.flatnonzero(change < 0)
+    falls = np.flatnonzero((change < 0) & (np.diff(shifted.stamp[places]) < 0))
     if not falls.size:
         return None
     times = series.seconds[places]

@@ -145,7 +145,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         known = known_offset(again, series, False)
     pace = cadence(series)
     found = _with_jumps(found, [*slips.faults, *moved.faults], pace.period_s)
-    _last(series, pace, stream, known, grain, found)
+    _last((slips.series, series), pace, stream, known, grain, found)
     found = [f for f in found if not _at_edges(f, disorder)]
     hidden = None if _late_or_coarse(found) else arrival.hidden_in(series, pace)
     found, hidden = arrival.but_for_left_out(found, hidden, pace)
@@ -284,10 +284,12 @@ def _but_for_turns(moved: Shifts, found: list[StampFault], told: Nanoseconds) ->
 
 
 def _last(
-    series: Series, pace: Cadence, stream: Stream, known: float | None,
+    states: tuple[Series, Series], pace: Cadence, stream: Stream, known: float | None,
     grain: grains.Grain | None, found: list[StampFault],
 ) -> None:  # fmt: skip
-    """What is looked for once everything else is taken out."""
+    """What is looked for once everything else is taken out; states: the series with its shifts
+    and without."""
+    shifted, series = states
     names = {fault.fault for fault in found}
     packets = "packetised" in names
     coarse = grain is not None and (packets or grain.size_s > _COARSE * pace.period_s)
@@ -302,7 +304,7 @@ def _last(
     if known is not None:
         found += _constant(series, known, grain.size_s if grain else _coarse(series), names)
     explained = names & {"whole_second_slip", "counter_wrap", "step", "relock"}
-    fall = None if explained else order.remaining_falls(series)
+    fall = None if explained else order.remaining_falls(shifted, series)
     found += [fall] if fall is not None and "backward_jump" not in names else []
     scan = arrival.scan(series, stream.points, pace.period_s)
     if scan is not None and not (scan.counts and {f.fault for f in found} & _OFF):
