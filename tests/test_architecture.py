@@ -6,6 +6,7 @@ import ast
 import importlib.util
 import re
 import tomllib
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -13,6 +14,7 @@ from typing import get_args
 
 import pytest
 
+from statements import statements
 from syncline_design.choice.outcome import FixKind
 from syncline_design.machine.sentences import or_rivals
 from syncline_design.report.sarif import _RULES
@@ -40,11 +42,27 @@ def _drawer() -> ModuleType:
     return module
 
 
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """What the tests ask of a file: names at its top, types, and imports anywhere in it."""
+
+    names: frozenset[str]
+    types: dict[str, str]
+    imports: tuple[ast.Import | ast.ImportFrom, ...]
+
+
 @cache
-def _names(path: Path) -> frozenset[str]:
+def _read(path: Path) -> _Read:
+    """Parsed once for all tests; the tree itself, of a thousand times the size, is not kept."""
+    tree = ast.parse(path.read_text("utf-8"))
+    found = (one for one in statements(tree) if isinstance(one, ast.Import | ast.ImportFrom))
+    return _Read(_names(tree), _types(tree, path), tuple(found))
+
+
+def _names(tree: ast.Module) -> frozenset[str]:
     """What a file defines at its top."""
     names = set()
-    for node in ast.parse(path.read_text("utf-8")).body:
+    for node in tree.body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             names.add(node.name)
         elif isinstance(node, ast.Assign):
@@ -56,7 +74,7 @@ def _names(path: Path) -> frozenset[str]:
 
 @pytest.mark.parametrize(("file", "name"), STATIONS, ids=lambda part: str(part))
 def test_every_station_exists(file: str, name: str) -> None:
-    assert name in _names(PACKAGE / file)
+    assert name in _read(PACKAGE / file).names
 
 
 def test_every_file_that_is_named_exists() -> None:
@@ -91,7 +109,7 @@ def test_every_station_is_reached_from_one_before(arrows: dict[str, set[str]]) -
         stations = [f"{PACKAGE.name}.{file[:-3].replace('/', '.')}" for file in _stations(walk)]
         reached = _below(stations[0], arrows)
         for station in stations[1:]:
-            is_effect = "EFFECT" in _names(ROOT / f"{station.replace('.', '/')}.py")
+            is_effect = "EFFECT" in _read(ROOT / f"{station.replace('.', '/')}.py").names
             assert is_effect or station in reached, station
             reached |= _below(station, arrows)
 
@@ -136,7 +154,7 @@ def test_every_folder_with_modules_is_in_the_wheel() -> None:
 
 def test_the_words_of_the_glossary_are_names_in_the_code() -> None:
     page = (ROOT / "docs" / "glossary.md").read_text("utf-8")
-    defined = frozenset().union(*(_names(path) for path in PACKAGE.rglob("*.py")))
+    defined = frozenset().union(*(_read(path).names for path in PACKAGE.rglob("*.py")))
     named = set(re.findall(r"`([A-Z][a-z]\w+)`", page))
     assert len(named) > 25
     assert named - defined == set()
@@ -169,10 +187,10 @@ def test_a_sentence_is_composed_in_one_place(words: str) -> None:
 SAME_MEANING = {"Index"}  # places in an array, of either width
 
 
-def _types(path: Path) -> dict[str, str]:
+def _types(tree: ast.Module, path: Path) -> dict[str, str]:
     """The classes and named types of a file, with what tells one from another of its name."""
     found = {}
-    for node in ast.parse(path.read_text("utf-8")).body:
+    for node in tree.body:
         if isinstance(node, ast.ClassDef):
             found[node.name] = f"class of {path}"
         elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
@@ -186,9 +204,9 @@ def test_a_type_has_one_home() -> None:
     known: set[tuple[str, str]] = set()
     for path in sorted(PACKAGE.rglob("*.py")):
         module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-        for name, what in _types(path).items():
+        for name, what in _read(path).types.items():
             homes.setdefault(name, {})[module] = what
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node in _read(path).imports:
             if isinstance(node, ast.ImportFrom):
                 known |= {(node.module or "", one.name) for one in node.names}
     twice = {
@@ -201,13 +219,13 @@ def test_a_type_has_one_home() -> None:
     assert set(twice) == SAME_MEANING  # an exception that is none any more goes
 
 
-def _imported(tree: ast.AST, modules: frozenset[str]) -> set[str]:
+def _imported(path: Path, modules: frozenset[str]) -> set[str]:
     """The package's own modules that a file imports anywhere: late and for type checkers too."""
     found = set()
-    for node in ast.walk(tree):
+    for node in _read(path).imports:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+        elif node.module is not None:
             inner = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= inner & modules or {node.module}
     return found & modules
@@ -231,6 +249,63 @@ def _cycle(arrows: dict[str, set[str]]) -> list[str]:
     return []
 
 
+def test_imports_are_found_wherever_they_stand() -> None:
+    """As a walk over every node finds them, in each kind of block that holds statements."""
+    text = """
+import a
+def f():
+    import b
+    class C:
+        async def g(self):
+            async with x:
+                from c import d
+for _ in x:
+    import e
+else:
+    import f
+while x:
+    import g
+else:
+    import h
+try:
+    import i
+except E:
+    import j
+else:
+    import k
+finally:
+    import l
+try:
+    pass
+except* E:
+    import m
+if x:
+    import n
+elif y:
+    import o
+else:
+    import p
+match x:
+    case 1:
+        with y:
+            import q
+    case _:
+        import r
+"""
+    for code in (text, *(path.read_text("utf-8") for path in PACKAGE.glob("cli/*.py"))):
+        tree = ast.parse(code)
+        found, wanted = (
+            {
+                (one.lineno, ast.unparse(one))
+                for one in walk
+                if isinstance(one, ast.Import | ast.ImportFrom)
+            }
+            for walk in (statements(tree), ast.walk(tree))
+        )
+        assert found == wanted
+    assert len(set(re.findall(r"(?:import|from) (\w)", text))) == 18
+
+
 def test_a_way_back_is_found() -> None:
     assert _cycle({"a": {"b"}, "b": {"c"}, "c": {"d", "b"}, "d": set()}) == ["b", "c", "b"]
     assert _cycle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
@@ -243,11 +318,10 @@ def arrows() -> dict[str, set[str]]:
         ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
         for path in sorted(PACKAGE.rglob("*.py"))
     }
-    trees = {name: ast.parse(path.read_text("utf-8")) for name, path in paths.items()}
     modules = frozenset(paths)
     root = {PACKAGE.name}  # names the functions of api for type checkers, and holds the version
     return {
-        name: _imported(tree, modules) - root for name, tree in trees.items() if name not in root
+        name: _imported(path, modules) - root for name, path in paths.items() if name not in root
     }
 
 

@@ -10,6 +10,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from statements import statements
+
 ROOT = Path(__file__).resolve().parent.parent / "syncline_design"
 # What is called by name from outside: the ways in, and what every file of a folder provides.
 WAYS_IN = ("api.py", "__init__.py", "__main__.py", "cli/__init__.py")
@@ -43,7 +45,7 @@ def defined(statement: ast.stmt) -> list[str]:
 
 def without_docs(statement: ast.stmt) -> ast.stmt:
     """Words of a docstring keep nothing alive."""
-    for each in ast.walk(statement):
+    for each in statements(statement):
         if isinstance(each, ast.FunctionDef | ast.ClassDef) and ast.get_docstring(each):
             each.body = each.body[1:] or [ast.Pass()]
     return statement
