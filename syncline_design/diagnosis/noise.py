@@ -106,7 +106,8 @@ class Structure:
 
     fixed (n, 3, 3) [m2]: what is known and not fitted, each row's own.  stamped (n, 3, k) [m]: the
     same, common to the rows of a stamp: the spec's timing errors.  survey (n, 3, q) [m]: errors of
-    the targets' survey, one standard deviation each, common to all rows of a target.
+    the targets' survey, one standard deviation each, common to all rows of a target; and of a frame
+    that the log alone laid.
     """
 
     time_s: Array

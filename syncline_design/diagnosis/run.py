@@ -21,6 +21,7 @@ from syncline_design.diagnosis.consequence import SpecPromise, promise_of, rms_m
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.findings import entry_of, findings
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
+from syncline_design.diagnosis.free_frame import with_free_frame
 from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
@@ -364,7 +365,8 @@ def prepared(inputs: Measured, log: Log, exclude: Sequence[str] = ()) -> Data:
     parts = directed_parts(view, found)
     structure = structure_of(view, parts)
     structure = still_axes_apart(structure, varying_axes(view.error(), structure))
-    return with_shown_noise(data_of(view, structure), plain_signatures(view, found))
+    shown = with_shown_noise(data_of(view, structure), plain_signatures(view, found))
+    return with_free_frame(shown)
 
 
 def _slip(result: SearchResult) -> Acting | None:

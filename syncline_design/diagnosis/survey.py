@@ -45,7 +45,7 @@ def with_shown_survey(data: Data, found: Sequence[Signature]) -> Data:
 def survey_m(data: Data) -> float | None:
     """Standard deviation [m] of one coordinate of a target."""
     survey = data.structure.survey
-    return None if survey is None else float(np.max(survey))
+    return None if survey is None or data.view.log.laid is not None else float(np.max(survey))
 
 
 def _indicators(data: Data, target: NDArray[np.int64], size_m: float) -> Array:

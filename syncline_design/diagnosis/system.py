@@ -16,6 +16,7 @@ from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.pose_pairs import lever_m
 from syncline_design.logs.reading import read_log
 from syncline_design.logs.static_arms import spec_arms
+from syncline_design.logs.stream_sources import laid_by
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import si_name
 from syncline_design.model.system import System
@@ -51,7 +52,8 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
     sources = row_sources(files, choice, names, poses, spec_arms(case.spec))
 
     def read(slip_s: float) -> Log:
-        return read_log(sources, names, choice.columns, ranges, slip_s, choice.origin, lever)
+        log = read_log(sources, names, choice.columns, ranges, slip_s, choice.origin, lever)
+        return replace(log, laid=laid_by(sources))
 
     log = read(0.0)
     reread = read if len(sources) > 1 else None

@@ -1,10 +1,13 @@
 """Two trajectories whose frames nothing relates, laid onto each other; what that hides is said.
 
 A turn about down and a shift (where neither says which way is down, any turn; where both know
-north, none) by least squares, in which far points count less.  Where a delay or a lever arm
-between the two clearly shows, it is fitted along, so that what the diagnosis is to find does not go
-into the frames (to first order: a lever turning during the delay does); only turn and shift are
-used.  They take up a constant shift and turn between the two, which can no longer be found.
+north, none) by least squares, in which far points count less.  It begins at the lever arm that the
+spec states.  Where a delay or a component of another lever arm clearly shows, that one is fitted
+along, so that what the diagnosis is to find does not go into the frames (to first order: a lever
+turning during the delay does); only turn and shift are used.  Components that do not show stay as
+stated: on a vehicle that never tilts, a lever arm down and a shift down are one, and a free one
+would scatter the other.  Turn and shift take up what is constant between the two, which can no
+longer be found.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ LEAST_POINTS: Final = 10
 LEAST_EXTENT_M: Final = 0.5
 FALLS: Final = 0.05  # by this share the squares have to fall before delay or lever is fitted along
 CLEARLY: Final = 15.0  # and by this many times what noise alone would do for each figure
-WIDTHS: Final = (0, 1, 4)  # figures beside turn and shift: none, the delay, the lever too
+BESIDE: Final = 4  # figures beside turn and shift: the delay, the lever arm's components
+NO_ARM: Final = np.zeros(3)
 
 
 class StillError(Exception):
@@ -63,8 +67,10 @@ class LaidTrack:
     body: Array | None
 
 
-def laid(moved: LaidTrack, onto: Array, turns: Turns) -> Laid | None:
+def laid(moved: LaidTrack, onto: Array, turns: Turns, arm_m: Array = NO_ARM) -> Laid | None:
     """The turn and shift that bring the first places onto the second (n, 3), pair by pair.
+
+    arm_m (3,): the stated lever arm of the second on the first's body, forward, right, down.
 
     None where they are in one frame already; StillError where the motion cannot tell the turn.
     Begun by Kabsch's solution (Umeyama, IEEE PAMI 13 (1991), without scale); then Gauss-Newton of
@@ -85,17 +91,28 @@ def laid(moved: LaidTrack, onto: Array, turns: Turns) -> Laid | None:
     if extent < LEAST_EXTENT_M and turns != "none":
         raise StillError(f"the positions extend over {to_digits(extent, 2)} m")
     begun = _kabsch(own.place, b, turns)
-    best = _fitted(own, b, begun, turns, WIDTHS[0])
-    for width in WIDTHS[1:]:
-        if width > 1 and own.body is None:
-            break
-        wider = _fitted(own, b, begun, turns, width)
-        noise = wider.squares / (3 * b.shape[0])
-        fell = best.squares - wider.squares
-        more = width - best.width
-        if fell > FALLS * best.squares and fell > CLEARLY * more * noise:
-            best = wider
+    best = _shown(own, b, begun, turns, arm_m)
     return Laid(best.turn, best.shift_m, best.rms_m, extent, best.delay_s)
+
+
+def _shown(
+    own: LaidTrack, onto: Array, begun: tuple[Array, Array], turns: Turns, arm_m: Array
+) -> _Fit:
+    """The fit with those figures beside turn and shift that clearly show, one after the other."""
+    start = np.concatenate([[0.0], arm_m])
+    left = list(range(1 if own.body is None else BESIDE))
+    free: tuple[int, ...] = ()
+    best = _fitted(own, onto, begun, turns, start, free)
+    while left:
+        trials = {k: _fitted(own, onto, begun, turns, start, (*free, k)) for k in left}
+        k = min(trials, key=lambda one: trials[one].squares)
+        fell = best.squares - trials[k].squares
+        noise = trials[k].squares / (3 * onto.shape[0])
+        if fell <= FALLS * best.squares or fell <= CLEARLY * noise:
+            break
+        best, free = trials[k], (*free, k)
+        left.remove(k)
+    return best
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,17 +121,18 @@ class _Fit:
     shift_m: Array
     squares: float  # of what is left, far points weighted down
     rms_m: float
-    width: int
     delay_s: float
 
 
 def _fitted(
-    own: LaidTrack, onto: Array, begun: tuple[Array, Array], turns: Turns, width: int
-) -> _Fit:
-    """Gauss-Newton with so many figures beside turn and shift."""
+    own: LaidTrack, onto: Array, begun: tuple[Array, Array], turns: Turns, start: Array,
+    free: tuple[int, ...],
+) -> _Fit:  # fmt: skip
+    """Gauss-Newton with these figures free beside turn and shift; start: delay and lever arm."""
     turn, shift = begun
-    extra = np.zeros(4)
+    extra = start.copy()
     count = FREE[turns]
+    figures = [*range(count + 3), *(count + 3 + k for k in free)]
     rest, weight = onto, np.ones(onto.shape[0])
     for _ in range(ROUNDS):
         local, slope = _slope(own, turn, extra, count)
@@ -122,12 +140,12 @@ def _fitted(
         apart = np.linalg.norm(rest, axis=1)
         usual = max(float(np.median(apart)), 1e-9)
         weight = np.minimum(1.0, FAR * usual / np.maximum(apart, 1e-12))
-        step = _step(slope[:, :, : count + 3 + width], rest, weight)
+        step = _step(slope[:, :, figures], rest, weight)
         axis = np.concatenate([np.zeros(3 - count), step[:count]])  # the last is about down
         turn, shift = _small(axis) @ turn, shift + step[count : count + 3]
-        extra = extra + np.pad(step[count + 3 :], (0, 4 - width))
+        extra[list(free)] += step[count + 3 :]
     squares = float(np.sum(weight * np.sum(rest**2, axis=1)))
-    return _Fit(turn, shift, squares, _rms(rest), width, float(extra[0]))
+    return _Fit(turn, shift, squares, _rms(rest), float(extra[0]))
 
 
 def _rms(apart: Array) -> float:

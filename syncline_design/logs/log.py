@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
+from syncline_design.logs.frame_fit import Turns
 from syncline_design.logs.stamps import usual_step_s
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -79,6 +80,8 @@ class Log:
     rejected: rows dropped, by reason.  notes: what was derived or cut, for people.
     rows_read: before any was dropped.
     thinned: rows of a very long log that are not in the windows kept of it.
+    laid: the turns (beside a shift) by which the truth was laid onto what was measured, where
+    nothing relates their frames: what is constant between the two is then no witness of anything.
     """
 
     kind: LogKind
@@ -90,6 +93,7 @@ class Log:
     rejected: Mapping[str, int]
     notes: tuple[str, ...] = ()
     thinned: int = 0
+    laid: Turns | None = None
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])

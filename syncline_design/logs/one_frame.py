@@ -10,7 +10,14 @@ import numpy as np
 from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import ATTITUDE, POSITION, VELOCITY
-from syncline_design.logs.frame_fit import Laid, LaidTrack, StillError, laid, mean_turn
+from syncline_design.logs.frame_fit import (
+    Laid,
+    LaidTrack,
+    StillError,
+    Turns,
+    laid,
+    mean_turn,
+)
 from syncline_design.logs.places import geodetic_to_ned
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.logs.refusals import refuse
@@ -57,24 +64,30 @@ def on_one_datum(
 
 
 def in_one_frame(
-    parts: Mapping[Role, Part], values: Mapping[int, StreamValues], choice: LogChoice, pair: bool
-) -> None:
-    """Tested and reference in one local frame, where a stated origin does not see to it."""
+    parts: Mapping[Role, Part], values: Mapping[int, StreamValues], choice: LogChoice, pair: bool,
+    arm_m: Array,
+) -> Turns | None:  # fmt: skip
+    """Tested and reference in one local frame, where a stated origin does not see to it.
+
+    arm_m: the spec's lever arm of the tested.  The turns that the one was laid onto the other by,
+    beside a shift; None where nothing had to be laid.
+    """
     tested = values[id(parts["position"].offer)]
     reference = values[id(parts["reference"].offer)]
     for one, other in ((tested, reference), (reference, tested)):
         if one.has(GLOBE) and not other.has(GLOBE):
             if other.origin is not None:
                 _about(one, other.origin, f"the origin of {other.offer.name}")
-                return
+                return None
             if choice.origin is not None:
                 if other.assumed and choice.frame is None:
                     _with_fitting_axes(other, one, np.asarray(choice.origin, dtype=float))
-                return  # `places` makes it local there
+                return None  # `places` makes it local there
             first = _first_place(one)
             _about(one, first, "its own first fix")
     if tested.has(POSITION[:2]) and reference.has(POSITION[:2]) and choice.origin is None:
-        _lay(reference, tested, pair)
+        return _lay(reference, tested, pair, arm_m)
+    return None
 
 
 def _with_fitting_axes(one: StreamValues, globe: StreamValues, origin: Array) -> None:
@@ -142,15 +155,16 @@ def _about(one: StreamValues, origin: Array, where: str) -> None:
     one.note(f"WGS 84 positions were made north, east, down about {where}, {at}")
 
 
-def _lay(reference: StreamValues, tested: StreamValues, pair: bool) -> None:
+def _lay(reference: StreamValues, tested: StreamValues, pair: bool, arm_m: Array) -> Turns | None:
     """The reference's frame onto the tested one's, where they are not the same already."""
     flat = _drop_idle_down(reference, tested)
     track = _track(reference, tested.time_ns)
     onto = tested.vectors(POSITION) if not flat else flattened(tested)
     free = reference.assumed or tested.assumed
+    turns: Turns = "none" if _know_north(reference, tested) else "heading"
     try:
-        fit = laid(track, onto, "none" if _know_north(reference, tested) else "heading")
-        freely = laid(track, onto, "any") if fit is not None and free and not flat else None
+        fit = laid(track, onto, turns, arm_m)
+        freely = laid(track, onto, "any", arm_m) if fit is not None and free and not flat else None
     except StillError as still:
         raise refuse(
             reference.offer.path,
@@ -160,12 +174,13 @@ def _lay(reference: StreamValues, tested: StreamValues, pair: bool) -> None:
             hint="state the origin: log: {origin: [47.3 deg, 8.55 deg, 460 m]}",
         ) from None
     if fit is not None and freely is not None and freely.rms_m < TILTED * fit.rms_m:
-        fit = freely
+        fit, turns = freely, "any"
     if fit is not None:
         _move(reference, fit)
         _say_laid(reference, tested, fit)
     if pair and free:
         _lay_bodies(reference, tested, 0.0 if fit is None else fit.delay_s)
+    return None if fit is None else turns
 
 
 def _know_north(*several: StreamValues) -> bool:

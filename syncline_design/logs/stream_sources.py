@@ -23,6 +23,7 @@ from syncline_design.logs.columns import (
     TARGET_ID,
     VELOCITY,
 )
+from syncline_design.logs.frame_fit import Turns
 from syncline_design.logs.one_frame import (
     flattened,
     in_one_frame,
@@ -33,7 +34,7 @@ from syncline_design.logs.one_frame import (
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer, Part, Role, parts_of
-from syncline_design.logs.row_source import NANOSECONDS, Clock
+from syncline_design.logs.row_source import NANOSECONDS, Clock, RowSource
 from syncline_design.logs.stream_times import UTC_CLOCK, on_one_timeline
 from syncline_design.logs.stream_values import (
     GLOBE,
@@ -52,12 +53,14 @@ class StreamSource:
 
     def __init__(self, path: Path, name: str, time_ns: Nanoseconds, calendar: bool,
                  columns: Mapping[str, Array], notes: Sequence[str],
-                 shown: Literal["ned"] | None = None) -> None:  # fmt: skip
+                 shown: Literal["ned"] | None = None,
+                 laid: Turns | None = None) -> None:  # fmt: skip
         self.path = path.joinpath(name.strip("/").replace("/", "."))
         self.header = ("time_s", *columns)
         self.cut = 0
         self.notes = tuple(notes)
         self.shown = shown  # axes that the file does not tell, as other places show them
+        self.laid: Turns | None = laid  # how it was turned, beside shifted, onto another's frame
         self._time_ns, self._calendar, self._columns = time_ns, calendar, columns
 
     def clock(self, name: str) -> Clock:
@@ -98,16 +101,27 @@ def sources_of(
     calendar = on_one_timeline([*several, *clocks], choice)
     _demand_places(parts, values)
     on_one_datum([*several, *clocks], parts, values)
+    turns: Turns | None = None
     if "reference" in parts and "position" in parts:
-        in_one_frame(parts, values, choice, pair)
+        turns = in_one_frame(parts, values, choice, pair, arms[1])
     ranging = parts.get("ranging")
     if ranging is not None and ranging.offer.has("points") and not ranging.offer.has("ranging"):
         cloud, place, turn = (values[id(parts[r].offer)] for r in _OF_A_CLOUD)
         with_ranges(cloud, place, turn, choice, survey, arms)
     return [
-        _source(one, [r for r, p in parts.items() if id(p.offer) == key], prefix, pair, calendar)
+        _source(one, _roles(parts, key), prefix, pair, calendar,
+                turns if "reference" in _roles(parts, key) else None)
         for key, one in values.items()
-    ]
+    ]  # fmt: skip
+
+
+def _roles(parts: Mapping[Role, Part], offer: int) -> list[Role]:
+    return [role for role, part in parts.items() if id(part.offer) == offer]
+
+
+def laid_by(sources: Sequence[RowSource]) -> Turns | None:
+    """The turns by which a reference was laid onto the tested, where nothing relates the two."""
+    return next((s.laid for s in sources if isinstance(s, StreamSource) and s.laid), None)
 
 
 def is_pose_pair(parts: Mapping[Role, Part]) -> bool:
@@ -199,8 +213,9 @@ def _clocks(
 
 
 def _source(
-    one: StreamValues, roles: Sequence[Role], prefix: str, pair: bool, calendar: bool
-) -> StreamSource:
+    one: StreamValues, roles: Sequence[Role], prefix: str, pair: bool, calendar: bool,
+    laid: Turns | None,
+) -> StreamSource:  # fmt: skip
     """Only the columns that belong to the parts that the stream plays."""
     columns: dict[str, Array] = {}
     if "reference" in roles:
@@ -217,7 +232,7 @@ def _source(
     if "ranging" in roles and TARGET_ID in one.columns:
         columns[TARGET_ID] = one.columns[TARGET_ID]
     return StreamSource(one.offer.path, one.offer.name, one.time_ns, calendar, columns, one.notes,
-                        one.shown)  # fmt: skip
+                        one.shown, laid)  # fmt: skip
 
 
 _ROLE_COLUMNS: Final[Mapping[Role, tuple[str, ...]]] = {
