@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.auditing.series import Array, Mask, scatter, spread
+from syncline_design.auditing.series import Array, Mask, median, percentile, scatter, spread
 from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_BLOCKS: Final = 180
@@ -76,13 +76,13 @@ def _level(time_s: Array, late_s: Array) -> tuple[float, float]:
     """
     width = spread(np.diff(late_s)) / float(np.sqrt(2.0))
     half = late_s.size // 2
-    rise = float(np.median(late_s[half:]) - np.median(late_s[:half]))
-    run = float(np.median(time_s[half:]) - np.median(time_s[:half]))
+    rise = median(late_s[half:]) - median(late_s[:half])
+    run = median(time_s[half:]) - median(time_s[:half])
     if run > 0.25 * float(time_s[-1] - time_s[0]) and abs(rise) > _STEEP * width:
         late_s = late_s - time_s * rise / run
         if late_s.size >= LEAST_MESSAGES:
             late_s, width = _without_cubic(time_s, late_s, width)
-    return float(np.percentile(late_s, LOW)), width
+    return percentile(late_s, LOW), width
 
 
 def _without_cubic(time_s: Array, late_s: Array, width: float) -> tuple[Array, float]:

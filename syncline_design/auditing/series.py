@@ -13,6 +13,7 @@ from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 NS = 1e9
+_FEW = 256  # numbers; beyond it numpy's partition is quicker than to sort them
 UNIX_S = 6e8  # later than this since 1970: a calendar's clock (1989)
 
 
@@ -71,12 +72,45 @@ def spread(values: Array) -> float:
     """Interquartile range; 0 of nothing."""
     if not values.size:
         return 0.0
-    low, high = np.percentile(values, [25, 75])
-    return float(high - low)
+    if values.size > _FEW or values.dtype != np.float64:
+        low, high = np.percentile(values, [25, 75])
+        return float(high - low)
+    ordered = np.sort(values, axis=None)
+    return _quantile(ordered, 0.75) - _quantile(ordered, 0.25)
+
+
+def percentile(values: Array, percent: float) -> float:
+    """As numpy's, to the bit; of few numbers its preparations take ten times as long as they."""
+    if not 0 < values.size <= _FEW or values.dtype != np.float64:
+        return float(np.percentile(values, percent))
+    return _quantile(np.sort(values, axis=None), percent / 100)
+
+
+def median(values: Array) -> float:
+    """As numpy's, to the bit, and as quick as `percentile`."""
+    if not 0 < values.size <= _FEW or values.dtype != np.float64:
+        return float(np.median(values))
+    ordered = np.sort(values, axis=None)
+    half = ordered.size // 2
+    if np.isnan(ordered[-1]):  # sorted to the end
+        return float("nan")
+    upper = float(ordered[half])
+    return upper if ordered.size % 2 else (float(ordered[half - 1]) + upper) / 2.0
+
+
+def _quantile(ordered: Array, part: float) -> float:
+    """Between neighbours as numpy goes: from the nearer one.  A NaN is the last of sorted ones."""
+    at = (ordered.size - 1) * part
+    below = min(int(at), ordered.size - 1)
+    low, high = float(ordered[below]), float(ordered[min(below + 1, ordered.size - 1)])
+    if np.isnan(ordered[-1]):
+        return float("nan")
+    weight = at - below
+    return high - (high - low) * (1.0 - weight) if weight >= 0.5 else low + (high - low) * weight
 
 
 def scatter(values: Array) -> float:
     """1.4826 times the median absolute deviation: sigma of a normal law, blind to outliers."""
     if not values.size:
         return 0.0
-    return OF_MEDIAN_DEVIATION * float(np.median(np.abs(values - np.median(values))))
+    return OF_MEDIAN_DEVIATION * median(np.abs(values - median(values)))

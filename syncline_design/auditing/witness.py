@@ -18,7 +18,7 @@ from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.levels import SURE
-from syncline_design.auditing.series import Array, Series, scatter, seconds
+from syncline_design.auditing.series import Array, Series, median, scatter, seconds
 from syncline_design.machine.quick_dataclass import dataclass
 
 Side = Literal["stamp", "receipt", "unknown"]
@@ -61,7 +61,7 @@ def witness_of(series: Series, pace: Cadence, blocks: Blocks) -> Witness | None:
     count = np.concatenate([[0.0], np.cumsum(_counted(series, pace))])
     when = seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
     apart = when - pace.period_s * count
-    level = np.asarray([float(np.median(apart[a:b])) for a, b in _pairs(blocks.edges)])
+    level = np.asarray([median(apart[a:b]) for a, b in _pairs(blocks.edges)])
     use = blocks.usable
     if use.sum() < 8:
         return None
