@@ -39,7 +39,10 @@ def _columns(data: Data) -> Array:
     assert log.laid is not None
     axes = np.eye(3)
     shifts = np.broadcast_to(axes[:, list(data.axes)], (len(log), 3, len(data.axes)))
-    about = np.nan_to_num(log.truth_m - np.nanmean(log.truth_m, axis=0))
+    known = np.isfinite(log.truth_m)
+    truth = np.where(known, log.truth_m, 0.0)  # an axis may be untold: a mean of nothing warns
+    middle = truth.sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    about = np.where(known, truth - middle, 0.0)
     turned = [np.cross(axes[k], about) for k in range(3 - FREE[log.laid], 3)]
     sized = [t / max(float(np.sqrt(np.mean(t**2))), 1e-12) for t in turned]
     return np.concatenate([shifts, *(t[:, :, None] for t in sized)], axis=2)

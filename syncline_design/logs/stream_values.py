@@ -130,7 +130,10 @@ def _collected(offer: Offer, pieces: Sequence[Piece]) -> tuple[Nanoseconds, dict
         for name in names
         if all(name in one.columns for one in pieces)
     }
-    figures = {n: v if v.dtype.kind == "i" else v.astype(float) for n, v in whole.items()}
+    with np.errstate(
+        invalid="ignore"
+    ):  # damaged bytes may be signalling NaN: they become quiet ones
+        figures = {n: v if v.dtype.kind == "i" else v.astype(float) for n, v in whole.items()}
     return np.concatenate([one.primary_ns for one in pieces]), figures
 
 
