@@ -258,6 +258,12 @@ def test_an_expired_waiver_is_loud_and_helps_nothing(waived: tuple[Path, str]) -
     told = [one.message for one in verdict.warnings if one.code == "waiver"]
     assert any(f"{waived[1]}: waiver expired on 2999-01-31" in one for one in told)
     assert "even with" not in said(console(on_verdict(verdict), colour=False))
+    missed = [r.id for r in verdict.requirements if r.waiver and r.status == "fail"]
+    assert waived[1] in missed
+    plural = "waivers" if len(missed) > 1 else "waiver"
+    for form in ("html", "markdown", "github"):
+        shown = said(render_checks(form, [verdict]))
+        assert f", {plural} of {' and '.join(missed)} expired" in shown
 
 
 def test_a_waiver_that_is_not_needed_is_said_not_to_be(tmp_path: Path) -> None:

@@ -51,13 +51,21 @@ def outcome(verdict: Checked) -> Outcome:
     """The verdict's outcome.
 
     A design that meets while a larger figure of its own does not, or while a miss is waived, says
-    so in the same breath.
+    so in the same breath, and so does a miss whose waiver is over.
     """
     found = OUTCOMES[verdict.verdict]
     if verdict.verdict == "refused":
         return found
     found = with_waived(found, waived_of(verdict.verdict, verdict.requirements))
-    return replace(found, word=found.word + qualification(verdict))
+    more = qualification(verdict) + _expired(verdict.requirements)
+    return replace(found, word=found.word + more)
+
+
+def _expired(rows: Sequence[RequirementResult]) -> str:
+    """Whose waiver is over, of what is missed; nothing where there is none."""
+    over = [row for row in rows if row.status == "fail" and row.waiver and row.waiver.expired]
+    names = sentence_list([visible(row.id) for row in over])
+    return f", {'waiver' if len(over) == 1 else 'waivers'} of {names} expired" if over else ""
 
 
 def waived_of(word: Word, rows: Sequence[RequirementResult]) -> tuple[str, ...]:
