@@ -10,7 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis import Diagnosis, diagnose
-from syncline_design.diagnosis.episodes import _best_run, _stands_out
+from syncline_design.diagnosis.episodes import MOST, _best_run, _place, _stands_out
+from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.effects import registry
 from syncline_design.report.on_findings import noise_lines
 from syncline_design.spec.edit import with_effects
@@ -23,13 +24,13 @@ FROM_S, TO_S, TIMES = 30.0, 48.0, 6.0
 SIGMA_M = (0.012, 0.012, 0.02)  # of the car's positions
 
 
-def _louder(log: WorldLog, path: Path) -> Path:
+def _louder(log: WorldLog, path: Path, to_s: float = TO_S) -> Path:
     """The log's file with more white noise in its positions for a while."""
     with log.to_csv(path).open(encoding="utf-8", newline="") as file:
         head, *lines = csv.reader(file)
     table = np.array(lines, dtype=float)
     time_s = table[:, head.index("time_s")]
-    inside = (time_s >= FROM_S) & (time_s <= TO_S)
+    inside = (time_s >= FROM_S) & (time_s <= to_s)
     rng = np.random.default_rng(8)
     for axis, sigma in zip(("north", "east", "down"), SIGMA_M, strict=True):
         more = rng.normal(0.0, sigma * np.sqrt(TIMES**2 - 1.0), int(inside.sum()))
@@ -86,13 +87,39 @@ def test_the_stretch_of_largest_sum_is_that_of_all_stretches() -> None:
 def test_blocks_that_scatter_alike_have_no_loud_stretch() -> None:
     rng = np.random.default_rng(5)
     flagged = sum(
-        _stands_out(rng.chisquare(30, 40) / 30.0, np.random.default_rng(k)) is not None
+        _stands_out(rng.chisquare(30, 40) / 30.0, MOST, np.random.default_rng(k)) is not None
         for k in range(60)
     )
     assert flagged <= 1
     loud = rng.chisquare(30, 40) / 30.0
     loud[11:17] += 3.0
-    assert _stands_out(loud, rng) == (11, 17)
+    assert _stands_out(loud, MOST, rng) == (11, 17)
+
+
+def test_a_stretch_of_a_few_blocks_is_found_whatever_orders_are_drawn() -> None:
+    rng = np.random.default_rng(6)
+    slope = rng.chisquare(3, 1000) / 3.0 - 1.0
+    slope[301:380] += 3.0  # of 40 blocks three, and a fifth of one
+    places = [_place(slope, np.random.default_rng(k)) for k in range(10)]
+    assert all(p is not None and abs(p[0] - 301) <= 7 and abs(p[1] - 380) <= 7 for p in places)
+
+
+def test_rows_that_scatter_alike_have_no_loud_stretch_of_any_length() -> None:
+    rng = np.random.default_rng(7)
+    found = [_place(rng.chisquare(3, 1000) / 3.0 - 1.0, np.random.default_rng(k))
+             for k in range(60)]  # fmt: skip
+    assert sum(p is not None for p in found) <= 1  # two in 1000 a draw: more in 0.7 % of runs
+
+
+def test_eight_seconds_of_a_hundred_are_a_loud_stretch_and_no_heavy_tails(tmp_path: Path) -> None:
+    log = make_log(scenario("car_stops", 4, 80.0, 8.0), ())
+    path = _louder(log, tmp_path / "log.csv", to_s=FROM_S + 6.4)
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    (one,) = diagnose(spec, [path], DiagnosisSettings(unseen_block=False)).findings
+    assert (one.effect, one.sensor, one.material) == ("noise_episode", "position", True)
+    assert one.from_s == pytest.approx(FROM_S, abs=0.6)
+    assert one.to_s == pytest.approx(FROM_S + 6.4, abs=0.6)
 
 
 def test_the_simulated_noise_grows_between_its_ends_alone() -> None:
