@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers, verdict_charts
+from syncline_design.report.columns import errors
 from syncline_design.report.document import Facts, Node, Text, show
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import (
@@ -72,13 +73,16 @@ def _alone(verdict: Verdict, found: tuple[MissionVerdict, ...]) -> Table | None:
     design = verdict.design
     if design is None or len(known) < len(found):
         return None
-    limit = verdict_charts.front_limit(verdict)
+    of_all = _worst(found)
+    *of_each, shown = errors([*(one.error_m for one in known), of_all], _in_unit_of(verdict))
+    names = [one.name for one in found]
     rows = [
-        _payload_row(one.name, one.alone, currency, limit) for one in found if one.alone is not None
+        _payload_row(name, one, currency, text)
+        for name, one, text in zip(names, known, of_each, strict=True)
     ]
     rows.append((
         Cell("all of them"), Cell(numbers.money(design.cost, currency), design.cost),
-        Cell(numbers.error(_worst(found), limit), _worst(found)), Cell(_sensors(design, found)),
+        Cell(shown, of_all), Cell(_sensors(design, found)),
     ))  # fmt: skip
     costs = [one.cost for one in known if one.cost is not None]
     note = ""
@@ -91,14 +95,19 @@ def _alone(verdict: Verdict, found: tuple[MissionVerdict, ...]) -> Table | None:
 
 
 def _payload_row(
-    name: str, one: RankedDesign, currency: str, limit: numbers.Limited | None
+    name: str, one: RankedDesign, currency: str, error: str
 ) -> tuple[Cell, Cell, Cell, Cell]:
     return (
-        Cell(f"{name} alone"),
+        Cell(name),
         Cell(numbers.money(one.cost, currency), one.cost),
-        Cell(numbers.error(one.error_m, limit), one.error_m),
+        Cell(error, one.error_m),
         Cell(_sensors(one.design)),
     )
+
+
+def _in_unit_of(verdict: Verdict) -> RequirementResult | None:
+    """The limit in whose unit errors of several missions stand, also where their limits differ."""
+    return verdict_charts.tightest_limit(verdict, "accuracy")
 
 
 def _worst(found: tuple[MissionVerdict, ...]) -> float:
@@ -156,7 +165,7 @@ def _price(found: Robustness, verdict: Verdict) -> list[tuple[str, str]]:
     else:
         currency = verdict.spec.currency
         amount = numbers.money(nominal.cost, currency)
-        error = numbers.error(nominal.error_m, verdict_charts.front_limit(verdict))
+        error = numbers.error(nominal.error_m, _in_unit_of(verdict))
         facts.append(("At given figures", f"{_sensors(nominal.design)}: {amount}, {error}"))
     if found.probability is not None:
         one = found.probability
