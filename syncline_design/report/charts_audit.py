@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 ROW: Final = 76.0
 MOST_MARKS: Final = 30
 MOST_LETTERS: Final = 34
+LINE: Final = 0.2  # height of a fault's name as a share of a row
+HEIGHTS: Final = (0.97, 0.8, 0.63, 0.46, 0.29)  # of a name's upper edge
+DRAWN: Final = 0.8 * WIDTH  # of the chart, without its labels [SVG units]
 
 
 def traces(rows: Sequence[StreamAudit]) -> InlineChart:
@@ -64,15 +67,39 @@ def _faults(axes: Axes, row: StreamAudit) -> None:
         if fault.to_s is not None and fault.to_s > begin and _is_episode(fault):
             axes.axvspan(begin, fault.to_s, color=SHADE, linewidth=0, zorder=0)
             axes.axvline(fault.to_s, color=colour, linewidth=0.7, linestyle=(0, (1, 2)))
+    _names(axes, row)
+
+
+def _names(axes: Axes, row: StreamAudit) -> None:
+    """Each fault's name beside its first beginning, at the height where it hides least."""
     marked = [f for f in row.faults if f.from_s is not None][:6]
-    for k, name in enumerate(dict.fromkeys(f.fault for f in marked)):
+    free = list(HEIGHTS)
+    for name in dict.fromkeys(f.fault for f in marked):
         first = next(f for f in marked if f.fault == name)
+        begin, (left, right) = first.from_s or 0.0, axes.get_xlim()
+        wide = (right - left) * min(1.0, len(name) * scales.LETTER / DRAWN)
+        leftwards = begin + wide > right
+        over = (begin - wide, begin) if leftwards else (begin, begin + wide)
+        top = min(free or HEIGHTS, key=lambda top: _hidden(row, over, top, axes.get_ylim()))
+        free = [one for one in free if one != top]
         axes.annotate(
-            name, (first.from_s or 0.0, 0.97 - 0.17 * (k % 5)),
-            xycoords=("data", "axes fraction"), xytext=(3, 0), textcoords="offset points",
+            name, (begin, top), xycoords=("data", "axes fraction"),
+            xytext=(-3 if leftwards else 3, 0), textcoords="offset points",
             color=BAD if first.counts else MUTED, va="top", zorder=6,
+            ha="right" if leftwards else "left",
             bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.8},  # over lines, not on them
         )  # fmt: skip
+
+
+def _hidden(
+    row: StreamAudit, over: tuple[float, float], top: float, ylim: tuple[float, float]
+) -> int:
+    """Points of the trace that a name would cover; over: its time [s], top: share of the row."""
+    low, high = ylim
+    upper, lower = low + top * (high - low), low + (top - LINE) * (high - low)
+    return sum(
+        over[0] <= p.time_s <= over[1] and p.low_s <= upper and p.high_s >= lower for p in row.trace
+    )
 
 
 def _is_episode(fault: StampFault) -> bool:
