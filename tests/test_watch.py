@@ -264,6 +264,21 @@ def test_ten_days_ring_on_the_day_of_the_change(spec: Path, tmp_path: Path) -> N
     assert "fig-evidence" in page
 
 
+def test_fewer_than_three_runs_are_no_all_clear(spec: Path, tmp_path: Path) -> None:
+    """Neither at first nor after a new baseline, and not where the runs differ plainly."""
+    case, store, words = load(spec), tmp_path / "store.jsonl", []
+    for day, one in enumerate(series(11, 3, np.array([9.0, 0, 0, 0, 0]) * BOUND, 1)):
+        add_run(store, "car", pinned_system(case), run_of(one, day))
+        words.append(watch(store, spec).output)
+    for count, said in enumerate(words[:2], 1):
+        assert f"Too few runs to tell ({count} of 3)" in said
+        assert "even a large change may not ring yet" in " ".join(said.split())
+        assert "Nothing changed" not in said
+    assert "Too few runs" not in words[2]
+    assert watch(store, "--accept").exit_code == 0
+    assert "Too few runs to tell (0 of 3)" in watch(store, spec).output
+
+
 def looked(spec: Path, store: Path) -> Stored:
     """What `watch` keeps of its looks when it adds a run."""
     stored = read_store(store)

@@ -38,6 +38,7 @@ from syncline_design.report.table import Cell
 from syncline_design.report.text import visible
 
 MOST_RUNS: Final = 10  # told outside the page
+FEWEST_RUNS: Final = 3  # of two that differ, neither says what is usual between runs
 
 
 def render_watch(name: str, found: Watch) -> str:
@@ -73,12 +74,19 @@ def on_watch(found: Watch) -> Document:
 
 
 def _outcome(found: Watch) -> Outcome:
-    looks = len([r for r in found.runs if r.run > found.baseline_after])
+    looks = _looks(found)
+    if not found.alarms and looks < FEWEST_RUNS:
+        return Outcome("warn", "?", f"Too few runs to tell ({looks} of {FEWEST_RUNS})")
     if not found.alarms:
         return Outcome("good", "\u2713", f"Nothing changed in {looks} run{'s'[: looks != 1]}")
     first = found.alarms[0]
     when = first.since.date or f"run {first.since.run}"
     return Outcome("bad", "!", f"Changed: {_name(first)}, since {when}")
+
+
+def _looks(found: Watch) -> int:
+    """Runs since the baseline, which are held against one another."""
+    return len([r for r in found.runs if r.run > found.baseline_after])
 
 
 def _name(one: Alarm) -> str:
@@ -93,6 +101,12 @@ def _sentences(found: Watch) -> Iterator[Inline]:
             "The alarm stays until ",
             code("watch STORE --accept"),
             " makes a new baseline: after a repair, or where the change is meant to stay.",
+        )
+    elif _looks(found) < FEWEST_RUNS:
+        yield (
+            f"Fewer than {FEWEST_RUNS} runs do not say what differs from run to run anyway, so "
+            "that even a large change may not ring yet. What each says alone is in the table of "
+            "runs."
         )
 
 
