@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.result import Scope
-from syncline_design.diagnosis.slow_states import LOST
+from syncline_design.diagnosis.slow_sums import LOST
 from syncline_design.diagnosis.sufficient import Less, Sufficient
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect

@@ -6,6 +6,8 @@ lost; by singular values, which leave lost directions alone, where it is not.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.linalg.lapack import dpocon, dpotrf, dpotri, dpotrs
 
@@ -24,14 +26,23 @@ def _factor(matrix: Array, lost: float) -> Array | None:
     return lower if info == 0 and share > SAFE * lost else None
 
 
-def solution(matrix: Array, right: Array, lost: float) -> Array:
-    """x of least squares in A x = B, A symmetric (m, m), B (m, c); lost: share of A's largest."""
+def solver(matrix: Array, lost: float) -> Callable[[Array], Array]:
+    """B (m, c) to x of least squares in A x = B, A symmetric (m, m); lost: share of A's largest."""
     lower = _factor(matrix, lost)
     if lower is None:
-        least: Array = np.asarray(np.linalg.lstsq(matrix, right, rcond=lost)[0], dtype=float)
-        return least
-    found: Array = dpotrs(lower, right, lower=1)[0]
-    return found
+        pseudo: Array = np.asarray(np.linalg.pinv(matrix, rcond=lost, hermitian=True), dtype=float)
+        return pseudo.__matmul__
+
+    def solved(right: Array) -> Array:
+        found: Array = dpotrs(lower, right, lower=1)[0]
+        return found
+
+    return solved
+
+
+def solution(matrix: Array, right: Array, lost: float) -> Array:
+    """The same of one B."""
+    return solver(matrix, lost)(right)
 
 
 def inverse(matrix: Array, lost: float) -> Array:

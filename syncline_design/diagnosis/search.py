@@ -56,6 +56,7 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.random_numbers import generator
 
+JUDGED = 6  # candidates that are judged at a time
 TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
 WITHIN_NATS, WITHIN_SHARE = 12.0, 0.35  # how far behind the best a candidate may be to be fitted
@@ -281,19 +282,17 @@ class Search:
         found = [t for t in self.scatter_trials(model) if plausible(self.data, t.model)]
         return preferred([t for t in found if t.log_p <= threshold])
 
-    def standing(self, model: Model, free: Sequence[Signature]) -> dict[Label, float]:
-        """Effects that noise of another kind would not show by chance, with how sure that is.
+    def standing(self, model: Model, asked: Sequence[Signature], limit: float) -> set[Label]:
+        """Effects that noise of another kind would not show by chance.
 
-        Each pays for the number of candidates, a step for its places (Bonferroni).
+        limit: log p for one of all candidates (Bonferroni); a step pays for its places as well.
         """
-        found: dict[Label, float] = {}
-        judged = self.states.judged(model, [s.columns for s in free]) if free else []
-        limit = self.chance(len({s.candidate.label for s in free}))
-        for s, one in zip(free, judged, strict=True):
-            log_p = one.log_p + (math.log(STEP_TIMES) if s.at else 0.0)
-            if log_p < limit:
-                found[s.candidate.label] = min(log_p, found.get(s.candidate.label, 0.0))
-        return found
+        judged = self.states.judged(model, [s.columns for s in asked])
+        return {
+            s.candidate.label
+            for s, one in zip(asked, judged, strict=True)
+            if one.log_p + (math.log(STEP_TIMES) if s.at else 0.0) < limit
+        }
 
     def chance(self, candidates: int) -> float:
         """log p that one of so many candidates falls below at the stated rate, at most."""
@@ -310,22 +309,43 @@ class Search:
     def screened(self, model: Model, rungs: Sequence[Rung]) -> list[tuple[Signature, NoiseLevel]]:
         """Signatures that gain most under any noise of the ladder, one per candidate."""
         free = self.free_signatures(model)
-        standing = self.standing(model, free)
-        best: dict[tuple[str, str, int], tuple[float, Signature, NoiseLevel]] = {}
+        best: dict[Label, tuple[float, Signature, NoiseLevel]] = {}
         for level, seen in rungs:
             for s, (gain, values) in zip(free, seen.gains(), strict=True):
-                if s.candidate.label not in standing or not possible(s, values):
+                if gain <= SCREENED_OUT or not possible(s, values):
                     continue
                 total = gain - seen.nll - 2.0 * s.columns.shape[2] - 4.0 * len(s.at)
                 known = best.get(s.candidate.label)
-                if gain > SCREENED_OUT and (known is None or known[0] < total):
+                if known is None or known[0] < total:
                     best[s.candidate.label] = (total, s, level)
         ranked = sorted(best.values(), key=lambda entry: -entry[0])
-        if not ranked:
+        return [(s, level) for _, s, level in self.first_standing(model, free, ranked)]
+
+    def first_standing(
+        self,
+        model: Model,
+        free: Sequence[Signature],
+        ranked: Sequence[tuple[float, Signature, NoiseLevel]],
+    ) -> list[tuple[float, Signature, NoiseLevel]]:
+        """The first few that noise of another kind would not show by chance, near the first.
+
+        They are judged a few at a time, for most never come into it.
+        """
+        limit = self.chance(len({s.candidate.label for s in free}))
+        kept: list[tuple[float, Signature, NoiseLevel]] = []
+        for at in range(0, len(ranked), JUDGED):
+            reach = max(WITHIN_NATS, WITHIN_SHARE * (kept[0][0] + model.nll)) if kept else math.inf
+            if len(kept) >= TRIED or (kept and ranked[at][0] <= kept[0][0] - reach):
+                break
+            part = ranked[at : at + JUDGED]
+            labels = {s.candidate.label for _, s, _ in part}
+            asked = [s for s in free if s.candidate.label in labels]
+            standing = self.standing(model, asked, limit)
+            kept += [entry for entry in part if entry[1].candidate.label in standing]
+        if not kept:
             return []
-        reach = max(WITHIN_NATS, WITHIN_SHARE * (ranked[0][0] + model.nll))
-        close = [entry for entry in ranked if entry[0] > ranked[0][0] - reach]
-        return [(s, level) for _, s, level in close[:TRIED]]
+        reach = max(WITHIN_NATS, WITHIN_SHARE * (kept[0][0] + model.nll))
+        return [entry for entry in kept if entry[0] > kept[0][0] - reach][:TRIED]
 
     def trial(
         self, model: Model, found: Signature, level: NoiseLevel, *, parted: bool = False

@@ -14,10 +14,9 @@ ch. 7; Efron and Stein, Annals of Statistics 9 (1981) for the jackknife, its F a
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,8 @@ from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled
 from syncline_design.diagnosis.judged import Course, Judged, course_of
 from syncline_design.diagnosis.noise import NoiseLevel, SensorKey, white_covariance
 from syncline_design.diagnosis.positive import inverse as inverse_of
-from syncline_design.diagnosis.positive import solution
+from syncline_design.diagnosis.recent import LastMade
+from syncline_design.diagnosis.slow_sums import LOST, Beside, Weighted
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
@@ -42,7 +42,6 @@ WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
 INSIDE = 12  # blocks of a part of the log in which an effect acts alone
 FEW = 8, 64  # targets, to be left out one group after the other
-LEAST_BLOCKS = 5
 LEAST_ROWS = 8  # of a block
 HUBER = 1.345  # standard deviations from where on a component counts less
 REWEIGHTED = 3
@@ -52,21 +51,11 @@ LEAST = 1e-2  # of the spec's sigma: slow courses smaller than this do not matte
 MATTERS = 1e-3  # of a row's white standard deviation: channels below have no say
 FLAT = 1e6  # prior variance of a constant while the sizes are found
 SCALE_LEAST = 0.02
-STEADY = 1e-2  # of the model's variance: blocks of an axis without noise agree by far better
-LOST = 1e-7  # share of a column's information below which others hold it all
 RIDGE = 1e-9  # of scaled columns that hold one another
 SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
 # Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
 KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
 KIN_SPREAD = 1.0  # standard deviation in log variance by which they differ
-
-
-@dataclass(frozen=True, slots=True)
-class _Sums:
-    """X'X (G, m, m) and X'e (G, m) of every part of the log, whitened and weighted."""
-
-    normal: Array
-    score: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +70,7 @@ class States:
     seen: NDArray[np.int64] | None  # (n,) group of targets of every row, where they are few
     roles: tuple[Channel, ...]  # sensor of every channel, and which of its readings
     explained: Array | None = None  # (n, 3, f) what effects could make of the error
+    kept: LastMade[Beside] = field(default_factory=LastMade, repr=False, compare=False)
 
     @property
     def count(self) -> int:
@@ -90,28 +80,16 @@ class States:
         self, model: Model, groups: Sequence[Array], own: Array | None = None
     ) -> list[Judged]:
         """Each group of columns (n, 3, p) alone beside the model's own effects."""
-        own = np.nan_to_num(slopes(self.data.view, model.acting)) if own is None else own
-        width = own.shape[2]
-        every = [own, *(np.nan_to_num(g) for g in groups)]
-        ends = np.cumsum([g.shape[2] for g in every])
-        columns = np.concatenate([*every, self.courses], axis=2)
-        parts, prior = self._sums(model.level, model.error, columns, width)
-        nuisance = np.r_[np.arange(width), np.arange(ends[-1], ends[-1] + self.courses.shape[2])]
-        prior = np.concatenate([np.zeros(width), prior])
-        wanted = np.arange(width, ends[-1])
-        normal, score = parts[0].normal.sum(0), parts[0].score.sum(0)
-        whole = _freed(normal, score, nuisance, wanted, prior)
-        seen = np.diag(whole[0]) > LOST * np.diag(normal)[wanted]
-        less = [
-            _each(
-                _freed(normal - n, score - s, nuisance, wanted, prior)
-                for n, s in zip(part.normal, part.score, strict=True)
-            )
-            for part in parts
-            if len(part.normal) >= LEAST_BLOCKS
-        ]
-        places = [slice(a - width, b - width) for a, b in itertools.pairwise(ends)]
-        return [_one(place, whole, less, seen) for place in places]
+        if not groups:
+            return []
+
+        def made() -> Beside:
+            acting = np.nan_to_num(slopes(self.data.view, model.acting))
+            known = self._weighted(model.level, model.error, acting if own is None else own)
+            return Beside(known, [self.block] if self.seen is None else [self.block, self.seen])
+
+        asked = (model, self.data, self.block, self.explained, own)
+        return self.kept.of(asked, made).judged(groups)
 
     def own(self, model: Model) -> list[Judged]:
         """The model's own effects, all together: one entry for each, marginal over the others.
@@ -144,18 +122,18 @@ class States:
         width = columns.shape[2]
         if self.count < BLOCKS or width == 0:
             return [None for _ in model.acting]
-        every = np.concatenate([columns, self.courses], axis=2)
-        (sums, *_), prior = self._sums(model.level, model.error, every, width)
-        known = sums.normal.sum(0) + np.diag(np.concatenate([np.zeros(width), prior]))
+        sums = self._weighted(model.level, model.error, columns)
+        normal, score = sums.sums(self.block)
+        known = normal.sum(0) + np.diag(sums.prior)
         scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
         values = np.linalg.pinv(known / scale[:, None] / scale, rcond=1e-12) @ (
-            sums.score.sum(0) / scale
+            score.sum(0) / scale
         )
-        left = sums.score - sums.normal @ (values / scale)
+        left = score - normal @ (values / scale)
         at, found = 0, []
         for one in model.acting:
             names = [] if span_of(one.effect) else names_of(one)
-            weight = sums.normal[:, at, at]
+            weight = normal[:, at, at]
             whole = float(one.values[names[0]]) + values[at] / scale[at] if names else 0.0
             own = whole + left[:, at] / np.where(weight > 0.0, weight, 1.0) if names else weight
             found.append(course_of(own, weight) if len(names) == 1 else None)
@@ -167,8 +145,8 @@ class States:
 
         columns (n, 3, m): `width` that are free, then the courses.
         """
-        (sums, *_), prior = self._sums(model.level, model.error, columns, width)
-        return sums.normal, sums.score, np.concatenate([np.zeros(width), prior])
+        sums = self._weighted(model.level, model.error, columns[:, :, :width])
+        return *sums.sums(self.block), sums.prior
 
     def within(self, inside: NDArray[np.bool_], count: int) -> States:
         """The same with `count` blocks of the rows inside, and one on either side of them."""
@@ -181,7 +159,7 @@ class States:
 
     def sizes(self, level: NoiseLevel, error: Array) -> dict[Channel, float]:
         """Variance of the slow courses of each sensor's channel over the spec's."""
-        _, prior = self._sums(level, error, self.courses, 0)
+        prior = self._weighted(level, error, np.zeros((*error.shape, 0))).prior
         return {self.roles[c]: float(1.0 / prior[self.channel == c][1]) for c in set(self.channel)}
 
     def shown_prior(self, total: Array, width: int, level: NoiseLevel) -> Array:
@@ -218,20 +196,18 @@ class States:
         size += 2.0 * float(np.sum(np.log(scale))) + float(np.sum(np.log(variance)))
         return 0.5 * float(score @ (solved / scale)) - 0.5 * size
 
-    def _sums(
-        self, level: NoiseLevel, remaining: Array, columns: Array, width: int
-    ) -> tuple[list[_Sums], Array]:
-        """Sums over parts at the final weights and scale, and the prior precision of courses."""
+    def _weighted(self, level: NoiseLevel, remaining: Array, own: Array) -> Weighted:
+        """Rows at the final weights and scale, the courses beside columns of a model's own."""
         axes = [k for k in range(3) if np.any(np.isfinite(self.data.view.log.truth_m[:, k]))]
         known = np.isfinite(self.data.view.log.truth_m)[:, axes]
         judged = known & np.isin(axes, self.data.axes)  # an axis that never varies has no noise
         covariance = white_covariance(self.data.structure, level)[:, axes][:, :, axes]
         root = np.linalg.inv(np.linalg.cholesky(covariance)) * known[:, :, None]
-        white = (root @ columns[:, axes]).reshape(-1, columns.shape[2])
+        columns = np.concatenate([own, self.courses], axis=2)
+        part = (root @ columns[:, axes]).reshape(-1, columns.shape[2])
         error = (root @ remaining[:, axes, None]).ravel()
-        q = self.courses.shape[2]
-        fixed = np.r_[np.arange(width), np.arange(white.shape[1] - q, white.shape[1])]
-        part, weight, scale2 = white[:, fixed], known.ravel().astype(float), 1.0
+        width, q = own.shape[2], self.courses.shape[2]
+        weight, scale2 = known.ravel().astype(float), 1.0
         more = np.zeros((len(part), 0))  # what else is no slow course
         if self.explained is not None:
             more = (root @ self.explained[:, axes]).reshape(len(part), -1)
@@ -252,11 +228,9 @@ class States:
             scale2 = _scale2(left[judged.ravel()], freedom)
             far = np.abs(left) / math.sqrt(scale2)
             weight = known.ravel() * np.minimum(1.0, HUBER / np.maximum(far, HUBER))
-        weight = weight / scale2
-        groupings = [self.block] if self.seen is None else [self.block, self.seen]
-        parts = [_parted(np.repeat(g, len(axes)), white, weight, error) for g in groupings]
-        prior = 1.0 / (size2[self.channel] / np.maximum(self.wave, 1))
-        return parts, prior
+        prior = np.maximum(self.wave, 1) / size2[self.channel]
+        prior = np.concatenate([np.zeros(width), prior])
+        return Weighted(tuple(axes), root, part, error, weight / scale2, prior)
 
     def _limits(self, level: NoiseLevel) -> Array:
         """Most that a channel's variance may be, over the spec's."""
@@ -334,44 +308,6 @@ def _beside(total: Array, free: NDArray[np.int64], first: int, count: int) -> tu
     return left[:-1, :-1], left[:-1, -1]
 
 
-def _parted(part: NDArray[np.int64], columns: Array, weight: Array, error: Array) -> _Sums:
-    """Sums over each part of the log."""
-    order = np.argsort(part, kind="stable")
-    ends = np.searchsorted(part[order], np.arange(int(part.max()) + 2))
-    normals, scores = [], []
-    for a, b in itertools.pairwise(ends):
-        rows = slice(a, b) if np.all(order == np.arange(order.size)) else order[a:b]
-        own = columns[rows]
-        normals.append(own.T @ (weight[rows, None] * own))
-        scores.append(own.T @ (weight[rows] * error[rows]))
-    return _Sums(np.array(normals), np.array(scores))
-
-
-def _each(found: Iterable[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Normal matrices (G, m, m) and scores (G, m) of the log less each part."""
-    normals, scores = zip(*found, strict=True)
-    return np.array(normals), np.array(scores)
-
-
-def _one(
-    place: slice,
-    whole: tuple[Array, Array],
-    less: Sequence[tuple[Array, Array]],
-    seen: NDArray[np.bool_],
-) -> Judged:
-    """One group of columns: its values, and what the log less each part makes of them."""
-    values, covariance = _solved(*whole, place, seen)
-    jackknives = []
-    for normals, scores in less:
-        off, _ = _solved(normals, scores, place, seen)
-        off -= off.mean(axis=0)
-        count = len(off)
-        spread = (count - 1) / count * off.T @ off
-        least = np.maximum(STEADY * np.diag(covariance) - np.diag(spread), 0.0)
-        jackknives.append((spread + np.diag(least), count))
-    return Judged(values, covariance, tuple(jackknives))
-
-
 def few_targets(data: Data) -> NDArray[np.int64] | None:
     """The target of every row where they are few: an error of its survey is in all its rows."""
     log = data.view.log
@@ -438,35 +374,3 @@ def _scale2(left: Array, freedom: float) -> float:
     rows = max(left.shape[0], 1)
     square = (OF_MEDIAN_DEVIATION * float(np.median(np.abs(left)))) ** 2 if left.size else 1.0
     return float(max(square * rows / max(rows - freedom, 1.0), SCALE_LEAST**2))
-
-
-def _freed(
-    normal: Array, score: Array, nuisance: Array, wanted: Array, prior: Array
-) -> tuple[Array, Array]:
-    """Normal matrix and score of the wanted columns, freed of the nuisance with its prior."""
-    inner = normal[np.ix_(nuisance, nuisance)] + np.diag(prior)
-    scale = np.sqrt(np.maximum(np.diag(inner), 0.0))
-    scale[scale == 0.0] = 1.0
-    cross = normal[np.ix_(nuisance, wanted)]
-    right = np.concatenate([cross, score[nuisance, None]], axis=1) / scale[:, None]
-    solved = solution(inner / scale[:, None] / scale, right, 1e-12) / scale[:, None]
-    return (
-        normal[np.ix_(wanted, wanted)] - cross.T @ solved[:, :-1],
-        score[wanted] - cross.T @ solved[:, -1],
-    )
-
-
-def _solved(
-    normal: Array, score: Array, place: slice, seen: NDArray[np.bool_]
-) -> tuple[Array, Array]:
-    """Values (..., p) and covariance of some columns; zero for those that are not seen."""
-    both = seen[place, None] & seen[place]
-    normal = np.where(both, normal[..., place, place], 0.0)
-    scale = np.sqrt(np.maximum(np.diagonal(normal, axis1=-2, axis2=-1), 0.0))
-    scale = np.where(scale == 0.0, 1.0, scale)
-    squares = scale[..., :, None] * scale[..., None, :]
-    if normal.shape[-1] == 1 and np.all(normal > 0.0):
-        inverse = 1.0 / normal
-    else:
-        inverse = np.linalg.pinv(normal / squares, rcond=1e-10, hermitian=True) / squares
-    return np.einsum("...ab,...b->...a", inverse, score[..., place] * seen[place]), inverse

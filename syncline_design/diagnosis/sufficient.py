@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.candidates import Candidate, candidates, signature, slopes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import SLOW_LEAST, NoiseLevel, Structure, precision
-from syncline_design.diagnosis.slow_states import LEAST_BLOCKS, LOST, SHOWN_NATS, States
+from syncline_design.diagnosis.slow_states import SHOWN_NATS, States
+from syncline_design.diagnosis.slow_sums import LEAST_BLOCKS, LOST
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
