@@ -8,9 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
 
 from syncline_design.diagnosis import Diagnosis, diagnose
-from syncline_design.diagnosis.episodes import MOST, _best_run, _place, _stands_out
+from syncline_design.diagnosis.episodes import (
+    MOST,
+    _best_run,
+    _clearest,
+    _place,
+    _shares,
+    _stands_out,
+)
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.effects import registry
 from syncline_design.report.on_findings import noise_lines
@@ -128,3 +136,42 @@ def test_the_simulated_noise_grows_between_its_ends_alone() -> None:
     grown = registry()["noise_episode"].depart(state, values, "attitude", None).attitude_noise
     assert np.flatnonzero(grown).tolist() == list(range(20, 31))
     assert set(grown) == {0.0, 3.0}
+
+
+def test_what_a_louder_sensor_saves_is_the_difference_of_two_normal_densities() -> None:
+    """Against a library, row by row, one of them without noise of the sensor's."""
+    rng = np.random.default_rng(4)
+    half, rest = rng.normal(size=(6, 3, 1)), rng.normal(size=(6, 3, 3))
+    half[0] = 0.0
+    own, others = half @ np.swapaxes(half, 1, 2), rest @ np.swapaxes(rest, 1, 2)
+    left, times, factor = rng.normal(size=(6, 3)), 1.7, 2.5
+    lower = np.linalg.cholesky(own + others)
+    alone = np.linalg.solve(lower, left[:, :, None])[:, :, 0]
+    found = _shares(lower, own, alone).of_variance(times).saved(factor)
+
+    def cost(k: int, size: float) -> float:
+        return -multivariate_normal.logpdf(left[k], cov=times * (others[k] + size * own[k]))
+
+    wanted = [cost(k, 1.0) - cost(k, factor**2) for k in range(6)]
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize("most", [4, 12])
+def test_the_clearest_stretch_is_that_of_all_pairs_of_ends(most: int) -> None:
+    rows = np.random.default_rng(9).exponential(size=(7, 12))
+
+    def contrast(row: np.ndarray, a: int, b: int) -> float:
+        inside, outside = row[a:b], np.r_[row[:a], row[b:]]
+        size = np.sqrt(len(inside) * len(outside) / len(row))
+        return float((inside.mean() - outside.mean()) * size)
+
+    clearest, ends = _clearest(rows, most)
+    for row, found, (a, b) in zip(rows, clearest, ends, strict=True):
+        every = {
+            (i, j): contrast(row, i, j)
+            for i in range(12)
+            for j in range(i + 2, min(i + most, 12) + 1)
+            if j - i < 12
+        }
+        assert (a, b) == max(every, key=lambda pair: every[pair])
+        assert found == pytest.approx(every[int(a), int(b)], rel=1e-12)

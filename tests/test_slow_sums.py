@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from syncline_design.diagnosis.recent import LastMade
-from syncline_design.diagnosis.slow_sums import Beside, Weighted
+from syncline_design.diagnosis.slow_sums import HeldFixed, Weighted
 
 ROWS, PARTS, PRIOR = 60, 6, np.array([0.0, 4.0, 9.0, 0.0])
 
@@ -37,7 +37,7 @@ def test_groups_are_judged_as_by_leaving_rows_out(shuffled: bool) -> None:
     error, weight = rng.normal(size=2 * ROWS), rng.uniform(0.2, 1.0, 2 * ROWS)
     white = (root @ fixed).reshape(-1, 4)
     known = Weighted((0, 2), np.broadcast_to(root, (ROWS, 2, 2)), white, error, weight, PRIOR)
-    found = Beside(known, [part]).judged(groups)
+    found = HeldFixed(known, [part]).judged(groups)
     of_row = np.repeat(part, 2)
     for group, one in zip(groups, found, strict=True):
         own = (root @ group[:, [0, 2]]).reshape(-1, group.shape[2])

@@ -24,7 +24,8 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import Index, groups, repeated, starts, summed
 from syncline_design.machine.quick_dataclass import dataclass
 
-_MANY = 100  # columns from which a step in Python for each stamp is cheaper than columns in turn
+_MANY = 40  # columns from which steps in Python over the stamps are cheaper than columns in turn
+_WIDE = 18  # states that are taken in one such step
 _LEAST_STEP = 1e-9  # least dt / T: keeps 1 - phi^2 above rounding
 
 
@@ -133,21 +134,40 @@ class Precision:
         return states if self.group is None else states[self.group]
 
     def _side_by_side(self, right: Array) -> Array:
-        """P^-1 R of many columns, R (k, m, c): stamp by stamp, all columns of one at once.
+        """P^-1 R of many columns, R (k, m, c): a few stamps at a time, all columns at once.
 
-        With A_i the inverse of L_ii L_ii' and D_i the block of P between two stamps, forwards
-        z_i = A_i (r_i - D_i-1 z_i-1), backwards x_i = z_i - A_i D_i x_i+1.
+        With A_i the inverse of L_ii L_ii', L_ii the factor's triangle of these stamps, and D_i the
+        block of P between the last of them and the next, forwards z_i = A_i (r_i - D_i-1 z_i-1),
+        backwards x_i = z_i - A_i D_i x_i+1.
         """
-        own, step = self.own_blocks(), self.step[:, :, None]
-        states = np.empty_like(right)
-        states[0] = own[0] @ right[0]
-        before = states[0]
-        for block, off, row, found in zip(own[1:], step, right[1:], states[1:], strict=True):
-            before = np.matmul(block, row - off * before, out=found)
-        for block, off, found in zip(own[-2::-1], step[::-1], states[-2::-1], strict=True):
-            found -= block @ (off * before)
+        k, m, c = right.shape
+        stamps = max(_WIDE // m, 1)
+        inverse = self._in_groups(stamps)
+        rows = np.zeros((len(inverse), stamps * m, c))
+        rows.reshape(-1, m, c)[:k] = right
+        step = np.ascontiguousarray(self.step[stamps - 1 :: stamps, :, None])
+        states = np.empty_like(rows)
+        before = np.matmul(inverse[0], rows[0], out=states[0])
+        for block, off, row, found in zip(inverse[1:], step, rows[1:], states[1:], strict=False):
+            row[:m] -= off * before[-m:]
+            before = np.matmul(block, row, out=found)
+        last = np.ascontiguousarray(inverse[:, :, -m:])
+        for block, off, found in zip(last[-2::-1], step[::-1], states[-2::-1], strict=False):
+            found -= block @ (off * before[:m])
             before = found
-        return states
+        return states.reshape(-1, m, c)[:k]
+
+    def _in_groups(self, stamps: int) -> Array:
+        """Inverses (g, w, w) of L_ii L_ii' of so many stamps each, the last ones made up."""
+        m = self.loading.shape[2]
+        wide, length = stamps * m, self.factor.shape[1]
+        bands = np.zeros((wide, -(-length // wide) * wide))
+        bands[0, length:] = 1.0
+        bands[: min(m + 1, wide), :length] = self.factor[:wide]
+        bands = bands.reshape(wide, -1, wide).swapaxes(1, 2)
+        inverse = lower_inverse(np.ascontiguousarray(bands), m)
+        grouped: Array = np.swapaxes(inverse, 1, 2) @ inverse
+        return grouped
 
     def own_blocks(self) -> Array:
         """Inverses (k, m, m) of L_ii L_ii', L_ii the factor's triangle of one stamp."""
@@ -210,12 +230,15 @@ def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array
     return Precision(inverse, loading, factor, step, log_det, slow, first, group)
 
 
-def lower_inverse(bands: Array) -> Array:
-    """Inverses (n, m, m) of the lower triangles (n, m, m) in bands (>= m, m, n), row by row."""
+def lower_inverse(bands: Array, below: int | None = None) -> Array:
+    """Inverses (n, m, m) of the lower triangles (n, m, m) in bands (>= m, m, n), row by row.
+
+    below: how many bands below the diagonal hold anything; all of them.
+    """
     m, n = bands.shape[1:]
     found = np.zeros((m, m, n))
     for a, row in enumerate(found):
-        for b in range(a):
+        for b in range(0 if below is None else max(a - below, 0), a):
             row[: b + 1] -= bands[a - b, b] * found[b, : b + 1]
         row[a] = 1.0
         row[: a + 1] /= bands[0, a]

@@ -119,34 +119,35 @@ def _in_sensor(
     if not np.any(expected > 0.0) or (place := _place(slope, rng)) is None:
         return None
     first, last = place
-    factor, times = 1.0, 1.0
+    lower = np.asarray(np.linalg.cholesky(white), dtype=float)
+    alone = np.asarray(np.linalg.solve(lower, left[:, :, None]), dtype=float)[:, :, 0]
+    shares = _shares(lower, own, alone)
+    factor, noise = 1.0, shares
     for _ in range(ROUNDS):
-        times = _usual(left, white, first, last)
-        rest, mine = times * (white - own), times * own
-        inside = slice(first, last)
-        saved = [np.sum(_saved(left[inside], rest[inside], mine[inside], k)) for k in SIZES]
-        factor = float(SIZES[int(np.argmax(saved))])
-        first, last = _best_run(_saved(left, rest, mine, factor))
+        noise = shares.of_variance(_usual(alone, first, last))
+        inside = noise.rows(first, last)
+        factor = float(SIZES[int(np.argmax([np.sum(inside.saved(k)) for k in SIZES]))])
+        first, last = _best_run(noise.saved(factor))
     if last - first > MOST * len(left) / BLOCKS:
         return None  # most of the log is the rule, not an episode
-    inside = slice(first, last)
-    parts = (left[inside], times * (white - own)[inside], times * own[inside])
-    gain = float(np.sum(_saved(*parts, factor)))
+    inside = noise.rows(first, last)
+    gain = float(np.sum(inside.saved(factor)))
     if factor < LEAST_GROWN or gain < NATS + 2.0 * math.log(BLOCKS):
         return None
-    if _steady(np.linalg.solve(np.linalg.cholesky(white[inside]), left[inside, :, None])[:, :, 0]):
+    if _steady(alone[first:last]):
         return None
     time_s = data.structure.time_s
-    spread = _spread(*parts, factor)
+    spread = _spread(inside, factor)
     return Episode(sensor, float(time_s[first]), float(time_s[last - 1]), factor, spread, gain)
 
 
-def _usual(left: Array, white: Array, first: int, last: int) -> float:
-    """Variance outside a stretch over the spec's, by the median of the squares (normal noise)."""
-    outside = np.r_[0:first, last : len(left)]
-    lower = np.linalg.cholesky(white[outside])
-    squares = np.linalg.solve(lower, left[outside, :, None]) ** 2
-    return float(np.median(squares)) / MEDIAN_SQUARE if outside.size else 1.0
+def _usual(alone: Array, first: int, last: int) -> float:
+    """Variance outside a stretch over the spec's, by the median of the squares (normal noise).
+
+    alone (n, a): the error, whitened row by row.
+    """
+    outside = np.r_[0:first, last : len(alone)]
+    return float(np.median(alone[outside] ** 2)) / MEDIAN_SQUARE if outside.size else 1.0
 
 
 def _place(slope: Array, rng: np.random.Generator) -> tuple[int, int] | None:
@@ -170,42 +171,67 @@ def _stands_out(blocks: Array, most: int, rng: np.random.Generator) -> tuple[int
 
     most: blocks of a stretch at most.
     """
-    n = len(blocks)
-    pairs = [(a, b) for a in range(n) for b in range(a + LEAST, min(a + most, n) + 1)]
-    first, last = np.array(pairs).T
-    count = last - first
-    size = np.sqrt(count * (n - count) / n)
-
-    def contrasts(rows: Array) -> Array:
-        sums = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1)
-        inside = sums[:, last] - sums[:, first]
-        outside = sums[:, -1:] - inside
-        found: Array = (inside / count - outside / (n - count)) * size
-        return found
-
-    own = contrasts(blocks[None])[0]
-    best = int(np.argmax(own))
+    own, best = _clearest(blocks[None], most)
     orders = np.array([rng.permutation(blocks) for _ in range(ORDERS)])
-    highest = float(np.max(contrasts(orders))) * (1.0 + TIE)
+    highest = float(np.max(_clearest(orders, most)[0])) * (1.0 + TIE)
     total = float(np.sum((blocks - blocks.mean()) ** 2))
-    made_up = float(own[best] ** 2) / max(total, 1e-300)  # between and inside the two parts
-    if own[best] <= highest or made_up < EXPLAINED:
+    made_up = float(own[0] ** 2) / max(total, 1e-300)  # between and inside the two parts
+    if own[0] <= highest or made_up < EXPLAINED:
         return None
-    return pairs[best]
+    return int(best[0, 0]), int(best[0, 1])
 
 
-def _saved(left: Array, rest: Array, own: Array, factor: float) -> Array:
-    """nat that every row saves when the sensor's part is factor^2 times as large (n,)."""
+def _clearest(rows: Array, most: int) -> tuple[Array, Array]:
+    """Of rows of blocks (r, n), the contrast of each one's loudest stretch, and its ends (r, 2).
 
-    def cost(covariance: Array) -> Array:
-        lower = np.linalg.cholesky(covariance)
-        white = np.linalg.solve(lower, left[:, :, None])[:, :, 0]
-        size = np.sum(np.log(np.einsum("nii->ni", lower)), axis=1)
-        found: Array = 0.5 * np.sum(white**2, axis=1) + size
-        return found
+    A stretch of c blocks of sum s, of n of sum S: (s / c - (S - s) / (n - c)) sqrt(c (n - c) / n).
+    """
+    r, n = rows.shape
+    sums = np.concatenate([np.zeros((r, 1)), np.cumsum(rows, axis=1)], axis=1)
+    clearest, ends = np.full(r, -np.inf), np.zeros((r, 2), dtype=int)
+    for count in range(LEAST, min(most, n) + 1):
+        inside = sums[:, count:] - sums[:, :-count]
+        at = np.argmax(inside, axis=1)
+        highest = inside[np.arange(r), at]
+        outside = sums[:, -1] - highest
+        size = math.sqrt(count * (n - count) / n)
+        contrast = (highest / count - outside / max(n - count, 1)) * size
+        better = contrast > clearest
+        clearest[better] = contrast[better]
+        ends[better] = np.stack([at, at + count], axis=1)[better]
+    return clearest, ends
 
-    saved: Array = cost(rest + own) - cost(rest + factor**2 * own)
-    return saved
+
+@dataclass(frozen=True, slots=True)
+class _Shares:
+    """Rows along axes on which all of the noise is one and a sensor's share of it is told.
+
+    squares (n, a): of the error, over the noise's variance; shares (n, a): of the sensor in it.
+    """
+
+    squares: Array
+    shares: Array
+
+    def of_variance(self, times: float) -> _Shares:
+        """The same where all noise is so many times the variance."""
+        return _Shares(self.squares / times, self.shares)
+
+    def rows(self, first: int, last: int) -> _Shares:
+        return _Shares(self.squares[first:last], self.shares[first:last])
+
+    def saved(self, factor: float) -> Array:
+        """nat that every row saves when the sensor's part is factor^2 times as large (n,)."""
+        grown = 1.0 + (factor**2 - 1.0) * self.shares
+        saved: Array = 0.5 * np.sum(self.squares * (1.0 - 1.0 / grown) - np.log(grown), axis=1)
+        return saved
+
+
+def _shares(lower: Array, own: Array, alone: Array) -> _Shares:
+    """Noise of lower factors L (n, a, a), of which `own` is a sensor's: L^-1 own L^-T = V d V'."""
+    half = np.linalg.solve(lower, own)
+    shares, turned = np.linalg.eigh(np.linalg.solve(lower, np.swapaxes(half, 1, 2)))
+    squares = np.einsum("nij,ni->nj", turned, alone) ** 2
+    return _Shares(squares, np.clip(shares, 0.0, 1.0))
 
 
 def _best_run(saved: Array) -> tuple[int, int]:
@@ -223,11 +249,11 @@ def _steady(white: Array) -> bool:
     return bool(np.sum(white[1:] * white[:-1]) > STEADY * np.sum(white**2))
 
 
-def _spread(left: Array, rest: Array, own: Array, factor: float) -> float:
+def _spread(noise: _Shares, factor: float) -> float:
     """Standard uncertainty of the factor, by the curve of the likelihood over its logarithm."""
     step = 0.05
     low, middle, high = (
-        float(np.sum(_saved(left, rest, own, factor * math.exp(k * step)))) for k in (-1, 0, 1)
+        float(np.sum(noise.saved(factor * math.exp(k * step)))) for k in (-1, 0, 1)
     )
     curve = (2.0 * middle - low - high) / step**2
     return factor / math.sqrt(curve) if curve > 0.0 else math.inf

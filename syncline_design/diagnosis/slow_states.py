@@ -29,7 +29,7 @@ from syncline_design.diagnosis.judged import Course, Judged, course_of
 from syncline_design.diagnosis.noise import NoiseLevel, SensorKey, white_covariance
 from syncline_design.diagnosis.positive import inverse as inverse_of
 from syncline_design.diagnosis.recent import LastMade
-from syncline_design.diagnosis.slow_sums import LOST, Beside, Weighted
+from syncline_design.diagnosis.slow_sums import LOST, HeldFixed, Weighted
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
@@ -70,7 +70,7 @@ class States:
     seen: NDArray[np.int64] | None  # (n,) group of targets of every row, where they are few
     roles: tuple[Channel, ...]  # sensor of every channel, and which of its readings
     explained: Array | None = None  # (n, 3, f) what effects could make of the error
-    kept: LastMade[Beside] = field(default_factory=LastMade, repr=False, compare=False)
+    kept: LastMade[HeldFixed] = field(default_factory=LastMade, repr=False, compare=False)
 
     @property
     def count(self) -> int:
@@ -83,10 +83,10 @@ class States:
         if not groups:
             return []
 
-        def made() -> Beside:
+        def made() -> HeldFixed:
             acting = np.nan_to_num(slopes(self.data.view, model.acting))
             known = self._weighted(model.level, model.error, acting if own is None else own)
-            return Beside(known, [self.block] if self.seen is None else [self.block, self.seen])
+            return HeldFixed(known, [self.block] if self.seen is None else [self.block, self.seen])
 
         asked = (model, self.data, self.block, self.explained, own)
         return self.kept.of(asked, made).judged(groups)

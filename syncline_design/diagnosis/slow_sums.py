@@ -112,7 +112,7 @@ def _held(normal: Array, score: Array, prior: Array) -> _Held:
     return _Held(solved, solved(score[:, None])[:, 0])
 
 
-class Beside:
+class HeldFixed:
     """Columns judged beside what is held fixed: by all rows, and by these less one part each."""
 
     def __init__(self, known: Weighted, groupings: Sequence[NDArray[np.int64]]) -> None:
