@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -146,23 +147,28 @@ def test_a_slip_that_leaves_most_of_the_error_is_no_cause(
     assert told.kind == kind
 
 
-@pytest.mark.parametrize("at_s", [8.0, 92.0])
-def test_a_step_near_an_end_of_a_log_is_a_cause(at_s: float, tmp_path: Path) -> None:
-    """60 ms of a clock in eight of a hundred seconds stands out by far, wherever they lie."""
-    step = hidden("timestamp_step", "position", step_s=0.06, time_s=at_s)
-    log = make_log(scenario("multirotor_lines", 9, 100.0, 5.0), (step,))
-    spec = tmp_path / "spec.yaml"
-    spec.write_text(log.spec_yaml(), encoding="utf-8")
-    found = diagnose(spec, [log.to_csv(tmp_path / "log.csv")])
-    named = [one for one in found.findings if one.kind == "cause" and one.material]
-    assert found.verdict == "explained"
-    (one,) = named  # the step, or what is the same, a delay from then on
-    size, since = (
-        ("step_s", one.parameters["time_s"].value)
-        if one.effect == "timestamp_step"
-        else ("latency_s", one.from_s)
-    )
-    low, high = one.parameters[size].interval95 or (0.0, 0.0)
-    assert (one.effect, one.sensor) in {("timestamp_step", "position"), ("latency", "position")}
-    assert low <= 0.06 <= high
-    assert abs(float(since or 0.0) - at_s) < 1.0
+def test_a_step_near_an_end_of_a_log_is_a_cause(tmp_path: Path) -> None:
+    """60 ms of a clock in eight of a hundred seconds stands out by far, wherever they lie.
+
+    Of four intervals of 95 % fewer than three hold in 1.4 % of choices of seeds.
+    """
+    held = 0
+    for at_s, seed in product((8.0, 92.0), (9, 10)):
+        step = hidden("timestamp_step", "position", step_s=0.06, time_s=at_s)
+        log = make_log(scenario("multirotor_lines", seed, 100.0, 5.0), (step,))
+        spec = tmp_path / "spec.yaml"
+        spec.write_text(log.spec_yaml(), encoding="utf-8")
+        found = diagnose(spec, [log.to_csv(tmp_path / "log.csv")])
+        named = [one for one in found.findings if one.kind == "cause" and one.material]
+        assert found.verdict == "explained"
+        (one,) = named  # the step, or what is the same, a delay from then on
+        size, since = (
+            ("step_s", one.parameters["time_s"].value)
+            if one.effect == "timestamp_step"
+            else ("latency_s", one.from_s)
+        )
+        low, high = one.parameters[size].interval95 or (0.0, 0.0)
+        assert (one.effect, one.sensor) in {("timestamp_step", "position"), ("latency", "position")}
+        held += low <= 0.06 <= high
+        assert abs(float(since or 0.0) - at_s) < 1.0
+    assert held >= 3

@@ -36,7 +36,7 @@ STRETCH = 80
 WINDOW = 500
 FIRST_TIMES_S = (None, 3.0, 30.0)
 FAR = 3.0  # standard uncertainties of a step after which slopes are found anew
-LONG, SHORT = 15, 10  # iterations of a noise fit from scratch, and from a good start
+LONG, SHORT = 40, 25  # looks of a noise fit from scratch, and from a good start
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,28 +151,29 @@ def fit(
     """Fit the parameters of the effects and the noise, in turn.
 
     Without a start the noise is fitted from the spec's; with one, the effects are adjusted at that
-    noise first, so that what they explain is not taken for noise.
+    noise first, so that what they explain is not taken for noise.  It is fitted on some of the
+    rows, and stays what it was where that suits all of them better.
     """
     bounds = bounds_of(data, opened)
     sizes = tuple(o.directed for o in opened if o.directed >= 0)
     level = start or first_guess(data.structure)
-    now = tuple(acting)
-    error, columns = data.error(now), None
-    iterations = LONG if start is None else SHORT
+    now, columns = tuple(acting), None
+    error = data.error(now)
+    looks = LONG if start is None else SHORT
     for _ in range(passes):
         known = precision(data.structure, level)
-        if now:
-            found = stepped(data, now, known, error)
-            now, error, columns = found.acting, found.error, found.columns
+        before = stepped(data, now, known, error)
+        now, error, columns = before.acting, before.error, before.columns
         scatter = (error - known.constant_part(error))[data.noise_rows]
         starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
-        fits = [
-            fit_noise(data.noise_structure, scatter, bounds, s, sizes, iterations) for s in starts
-        ]
-        level, _ = min(fits, key=lambda found: found[1])
+        fits = [fit_noise(data.noise_structure, scatter, bounds, s, sizes, looks) for s in starts]
+        old, (level, _) = level, min(fits, key=lambda found: found[1])
     factored = precision(data.structure, level)
     found = stepped(data, now, factored, error, columns=columns)
     nll = factored.likelihood_of(found.squares)
+    if bounds.hold(old, sizes) and known.likelihood_of(before.squares) < nll:
+        level, factored, found = old, known, before
+        nll = known.likelihood_of(before.squares)
     return Model(
         found.acting, tuple(opened), bounds, level, nll, found.covariance, found.error, factored
     )

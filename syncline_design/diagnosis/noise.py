@@ -8,6 +8,7 @@ is a finding.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import field, replace
 
 import numpy as np
@@ -26,6 +27,7 @@ SLOW_LEAST = 1e-4
 OPEN = 1e6
 RELATIVE_FLOOR = 1e-12  # of a row's variances: keeps them invertible whatever sizes meet in a row
 TIME_USUAL_S = 25.0  # centre of the weak prior on time constants: minutes or fractions of one
+ROUNDING = 1e-9  # of a limit, by which a fitted figure at it may seem to exceed it
 KEPT = 3  # factored covariances of one structure
 
 
@@ -179,6 +181,13 @@ class Bounds:
             for part, limits in zip(structure.slow, self.slow, strict=True)
         )
         return Bounds(factor, slow)
+
+    def hold(self, level: NoiseLevel, free_sizes: Sequence[int]) -> bool:
+        """Whether a level is within the limits, with no directed part but the free ones."""
+        limits = [*self.factor, *(limit for own in self.slow for limit in own)]
+        figures = [*level.factor, *(v for own in level.slow for v in own)]
+        within = all(v <= b * (1.0 + ROUNDING) for v, b in zip(figures, limits, strict=True))
+        return within and all(s == 0.0 or i in free_sizes for i, s in enumerate(level.size))
 
 
 def _is_down(what: str, axis: int) -> bool:

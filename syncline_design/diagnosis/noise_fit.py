@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError
 
+from syncline_design.diagnosis.box_newton import CostHere, least
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.noise import (
     FACTOR_LIMIT,
@@ -18,6 +21,7 @@ from syncline_design.diagnosis.noise import (
     Structure,
     precision,
 )
+from syncline_design.diagnosis.noise_bend import average_information, by_times, damped
 from syncline_design.diagnosis.noise_slopes import Slopes, noise_slopes, summed_over
 from syncline_design.effects.record import Array
 
@@ -29,6 +33,9 @@ TIME_SPREAD = 1.0  # its standard deviation in log T
 LONG_SHARE = 1e3  # time constants over the span, from which a series is exact
 MEAN_SPREAD = 0.1  # in log variance, by which a mean over the log may exceed what courses show
 FACTOR_LEAST = 0.05
+LEAST_BEND = 1e-3  # [nat] along any logarithm, of which the log may tell nothing
+WORTH = 0.1  # nat that a step has to promise
+LOOKS = 40
 
 
 class Packing:
@@ -86,13 +93,11 @@ class Packing:
 
     def slopes_at(self, level: NoiseLevel, known: Precision, error: Array) -> Slopes:
         """Slopes of the NLL by what the covariance is made of."""
-        times = [t for own in level.time_constant_s for t in own]
-        fresh = np.zeros(known.loading.shape[2] - len(times))
-        return noise_slopes(known, error, self.structure.time_s, np.concatenate([times, fresh]))
+        return noise_slopes(known, error, self.structure.time_s, self._constants(level, known))
 
     def slopes(self, level: NoiseLevel, found: Slopes) -> Array:
         """Slopes of the NLL and the prior by the packed logarithms."""
-        factor, slow, sizes = self._by_size(level, found.white, found.column)
+        factor, slow, sizes = self._sized(level, found.white, found.column)
         inside = np.array(level.factor) < FACTOR_LIMIT
         factor += np.where(inside, np.log(level.factor), 0.0) / FACTOR_SPREAD**2
         usual = [
@@ -101,78 +106,137 @@ class Packing:
             for t in (chosen[:1] if part.shared_time else chosen)
         ]
         excess, by_time = self._excess_slopes(level)
-        constants = self._of_times(found.time) + usual + by_time
+        constants = np.array(self._of_times(found.time.tolist())) + usual + by_time
         return np.concatenate([factor, slow + excess, constants, sizes])
 
-    def steepness(self, level: NoiseLevel, found: Slopes) -> Array:
-        """About how the NLL bends along each packed logarithm: scales that a search is quick in.
+    def bend(self, level: NoiseLevel, known: Precision, found: Slopes) -> Array:
+        """About how the NLL and the prior bend along the packed logarithms, (p, p)."""
+        information = average_information(known, self.moved(level, known, found))
+        expected = np.concatenate(self._sized(level, found.expected_white, found.expected_column))
+        told = np.concatenate(self._sized(level, found.white, found.column))
+        times = len(information) - len(expected)
+        at = len(expected) - len(self.free_sizes)
+        wanted, shown = (np.insert(v, [at] * times, 0.0) for v in (expected, expected - told))
+        total = damped(information, wanted, shown) + self._prior_bend(level)
+        bend: Array = total + LEAST_BEND * np.eye(len(total))
+        return bend
 
-        What a part makes up of the error, half of it for a time constant, and the prior's own.
-        """
-        factor, slow, sizes = self._by_size(level, found.expected_white, found.expected_column)
-        inside = np.array(level.factor) < FACTOR_LIMIT
-        times = 0.5 * self._of_times(0.5 * found.expected_column) + TIME_SPREAD**-2
-        return np.concatenate(
-            [np.maximum(factor, 1.0) + inside / FACTOR_SPREAD**2, slow + 1.0, times, sizes + 1.0]
-        )
+    def moved(self, level: NoiseLevel, known: Precision, found: Slopes) -> Array:
+        """C_j C^-1 e (n, 3, p) by every packed logarithm."""
+        made = known.loading * found.states[:, None, :]  # by the logarithm of half a scale
 
-    def _of_times(self, column: Array) -> Array:
-        """Figures of the slow columns, summed where these share a time constant."""
+        def of_white(covariance: Array) -> Array:
+            product: Array = (covariance @ found.weighted[:, :, None])[:, :, 0]
+            return product
+
+        def of_columns(columns: slice) -> Array:
+            total: Array = 2.0 * np.sum(made[:, :, columns], axis=2)
+            return total
+
+        factor, slow, sizes = self._by_size(level, of_white, of_columns)
+        constants = self._constants(level, known)
+        by_time = by_times(known, found, self.structure.time_s, constants)
+        times = self._of_times(list(np.moveaxis(by_time, 2, 0)))
+        none = np.zeros(found.weighted.shape)
+        return np.stack([none + one for one in (*factor, *slow, *times, *sizes)], axis=2)
+
+    def _prior_bend(self, level: NoiseLevel) -> Array:
+        """Second slopes of the prior, as far as they are positive."""
+        factors = (np.array(level.factor) < FACTOR_LIMIT) / FACTOR_SPREAD**2
+        columns = sum(part.columns for part in self.structure.slow)
+        at_time, excess = len(factors) + columns, []
+        size = len(self.limits())
+        own = np.zeros(size)
+        own[: len(factors)] = factors
+        k = 0
+        for part, over, times in zip(
+            self.structure.slow, self._excess(level), level.time_constant_s, strict=True
+        ):
+            for j, one in enumerate(over):
+                slope = np.zeros(size)
+                slope[len(factors) + k + j] = 1.0 / MEAN_SPREAD
+                place = at_time + (0 if part.shared_time else j)
+                slope[place] = mean_share_slope(times[j], self.span_s) / MEAN_SPREAD
+                own[place] = TIME_SPREAD**-2
+                excess += [np.outer(slope, slope)] if one > 0.0 else []
+            k += part.columns
+            at_time += 1 if part.shared_time else part.columns
+        total: Array = np.diag(own) + sum(excess)
+        return total
+
+    def _constants(self, level: NoiseLevel, known: Precision) -> Array:
+        """Time constant of every column of the loading [s], 0 of what is new at every stamp."""
+        times = [t for own in level.time_constant_s for t in own]
+        return np.concatenate([times, np.zeros(known.loading.shape[2] - len(times))])
+
+    def _of_times(self, columns: list[Any]) -> list[Any]:
+        """What belongs to the slow columns, summed where these share a time constant."""
         at = 0
-        found: list[float] = []
+        found: list[Any] = []
         for part in self.structure.slow:
-            held = column[at : at + part.columns]
+            held = columns[at : at + part.columns]
             at += part.columns
-            found += [float(np.sum(held))] if part.shared_time else held.tolist()
-        return np.array(found)
+            found += [sum(held)] if part.shared_time else held
+        return found
 
-    def _by_size(
-        self, level: NoiseLevel, white: Array, column: Array
-    ) -> tuple[Array, Array, Array]:
+    def _sized(self, level: NoiseLevel, white: Array, column: Array) -> tuple[Array, Array, Array]:
         """By the logarithms of factors, slow variances and sizes: from the slopes by covariances.
 
         white (n, 3, 3): by each row's; column (m,): by the logarithm of each column's scale.
         """
-        structure = self.structure
-        own = np.cumsum([0, *(part.columns for part in structure.slow)])
-        factor = np.array(
-            [
-                2.0 * f**2 * summed_over(white, w.grown(level).covariance)
-                if not structure.shared or w.loading is None
-                else 0.0
-                for w, f in zip(structure.white, level.factor, strict=True)
-            ]
+        factor, slow, sizes = self._by_size(
+            level, lambda own: summed_over(white, own), lambda own: float(np.sum(column[own]))
         )
+        return np.array(factor), np.array(slow), np.array(sizes)
+
+    def _by_size(
+        self,
+        level: NoiseLevel,
+        of_white: Callable[[Array], Any],
+        of_columns: Callable[[slice], Any],
+    ) -> tuple[list[Any], list[Any], list[Any]]:
+        """What goes with the logarithms of factors, slow variances and sizes.
+
+        of_white: what goes with a white covariance (n, 3, 3); of_columns: with the logarithm of the
+        scale of some columns of the loading.
+        """
+        structure = self.structure
+        own = np.cumsum([0, *(part.columns for part in structure.slow)]).tolist()
+        factor: list[Any] = [
+            2.0 * f**2 * of_white(w.grown(level).covariance)
+            if not structure.shared or w.loading is None
+            else 0.0
+            for w, f in zip(structure.white, level.factor, strict=True)
+        ]
         for k, part in enumerate(structure.slow):
             index = [w.sensor for w in structure.white].index(part.sensor)
             if level.factor[index] > 1.0:
-                factor[index] += float(np.sum(column[own[k] : own[k + 1]]))
-        sizes = self._shared(level, column[own[-1] :], factor)
-        if not structure.shared:
-            parts = [structure.directed[i].direction for i in self.free_sizes]
-            sizes = [
-                2.0 * level.size[i] ** 2 * summed_over(white, d @ np.swapaxes(d, 1, 2))
-                for i, d in zip(self.free_sizes, parts, strict=True)
-            ]
-        return factor, 0.5 * column[: own[-1]], np.array(sizes)
+                factor[index] = factor[index] + of_columns(slice(own[k], own[k + 1]))
+        slow = [0.5 * of_columns(slice(k, k + 1)) for k in range(own[-1])]
+        if structure.shared:
+            return factor, slow, self._shared(level, own[-1], factor, of_columns)
+        parts = [(level.size[i], structure.directed[i].direction) for i in self.free_sizes]
+        sizes = [2.0 * s**2 * of_white(d @ np.swapaxes(d, 1, 2)) for s, d in parts]
+        return factor, slow, sizes
 
-    def _shared(self, level: NoiseLevel, column: Array, factor: Array) -> list[float]:
-        """Slopes by the columns that rows of a stamp share: added to the factors; by the sizes."""
-        structure, at = self.structure, 0
-        sizes = dict.fromkeys(self.free_sizes, 0.0)
-        if not structure.shared:
-            return list(sizes.values())
+    def _shared(
+        self, level: NoiseLevel, at: int, factor: list[Any], of_columns: Callable[[slice], Any]
+    ) -> list[Any]:
+        """The same of the columns that rows of a stamp share, from column `at` on: added to the
+        factors; by the sizes."""
+        structure = self.structure
+        sizes: dict[int, Any] = dict.fromkeys(self.free_sizes, 0.0)
         at += 0 if structure.stamped is None else structure.stamped.shape[2]
         for k, part in enumerate(structure.white):
             if part.loading is not None:
                 width = part.loading.shape[2]
-                factor[k] += float(np.sum(column[at : at + width]))
+                factor[k] = factor[k] + of_columns(slice(at, at + width))
                 at += width
         for i, (directed, size) in enumerate(zip(structure.directed, level.size, strict=True)):
             if size > 0.0:
                 width = directed.direction.shape[2]
                 if i in sizes:
-                    sizes[i] = float(np.sum(column[at : at + width]))
+                    sizes[i] = of_columns(slice(at, at + width))
                 at += width
         return list(sizes.values())
 
@@ -242,40 +306,27 @@ def fit_noise(
     bounds: Bounds,
     start: NoiseLevel,
     free_sizes: tuple[int, ...] = (),
-    iterations: int = 30,
+    looks: int = LOOKS,
 ) -> tuple[NoiseLevel, float]:
     """Noise level of largest likelihood within bounds, and the NLL [nat] reached (no prior in it).
 
     error (n, 3) [m] on the structure's rows, which holds no errors of a survey; free_sizes: which
-    directed parts are fitted.
+    directed parts are fitted; looks: at levels, at most.
     """
-    from scipy.optimize import minimize
-
     packing = Packing(structure, bounds, free_sizes)
-    first = packing.pack(start)
-    level = packing.unpack(first)
-    found = packing.slopes_at(level, precision(structure, level), error)
-    scale = np.sqrt(packing.steepness(level, found))
-    begun = (first * scale, level, found)
 
-    def cost(scaled: Array) -> tuple[float, Array]:
-        at, level, found = begun
-        if not np.array_equal(scaled, at):
-            level = packing.unpack(scaled / scale)
-            try:
-                found = packing.slopes_at(level, precision(structure, level), error)
-            except LinAlgError:
-                return 1e15, np.zeros_like(scaled)
-        total = precision(structure, level).likelihood_of(found.squares) + packing.prior(level)
-        return total, packing.slopes(level, found) / scale
+    def look(place: Array) -> CostHere | None:
+        level = packing.unpack(place)
+        try:
+            known = precision(structure, level)
+            found = packing.slopes_at(level, known, error)
+        except LinAlgError:
+            return None
+        total = known.likelihood_of(found.squares) + packing.prior(level)
+        slope = packing.slopes(level, found)
+        return CostHere(total, slope, lambda: packing.bend(level, known, found))
 
-    result = minimize(
-        cost,
-        first * scale,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=np.array(packing.limits()) * scale[:, None],
-        options={"maxiter": iterations, "ftol": 5e-6, "gtol": 0.1, "maxls": 10},
-    )
-    level = packing.unpack(result.x / scale)
-    return level, float(result.fun) - packing.prior(level)
+    low, high = np.array(packing.limits()).T
+    place, total = least(look, packing.pack(start), (low, high), WORTH, looks)
+    level = packing.unpack(place)
+    return level, total - packing.prior(level)

@@ -31,6 +31,7 @@ class Slopes:
     the logarithm of each column's scale.  time (m,): by the logarithm of each time constant.
     squares: e' C^-1 e, which is found on the way.  expected: the same slopes but for what the error
     itself says, tr(C^-1 dC) / 2, which at the best fit is what a part makes up of the error.
+    weighted (n, 3): C^-1 e; states (n, m): posterior means of the processes at every row.
     """
 
     white: Array
@@ -39,6 +40,32 @@ class Slopes:
     squares: float
     expected_white: Array
     expected_column: Array
+    weighted: Array
+    states: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """Unit Gauss-Markov processes from stamp to stamp, (n - 1, m); new at every stamp where T is 0.
+
+    phi: what is left of the one before; fresh: 1 - phi^2.  By log T: turned, of 1 / fresh, which Q
+    has at both stamps; crossed, of -phi / fresh between them.
+    """
+
+    phi: Array
+    fresh: Array
+    turned: Array
+    crossed: Array
+
+    @classmethod
+    def of(cls, time_s: Array, constants_s: Array) -> Steps:
+        """T (m,) [s]."""
+        slow = constants_s > 0.0
+        ratio = np.diff(time_s)[:, None] / np.where(slow, constants_s, 1.0)
+        ratio = np.where(slow, np.maximum(ratio, 1e-9), 50.0)
+        phi, fresh = np.exp(-ratio), -np.expm1(-2.0 * ratio)
+        turned = 2.0 * phi**2 * ratio / fresh**2
+        return cls(phi, fresh, turned, -(phi * ratio / fresh + phi * turned))
 
 
 def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Array) -> Slopes:
@@ -51,7 +78,8 @@ def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Arr
         outer = own[:, :, None] * own[:, None, :]
         squares = float(np.sum(error * own))
         none = np.zeros(0)
-        return Slopes(0.5 * (inverse - outer), none, none, squares, 0.5 * inverse, none)
+        white, states = 0.5 * (inverse - outer), np.zeros((len(error), 0))
+        return Slopes(white, none, none, squares, 0.5 * inverse, none, own, states)
     states = known.states(weighted)[:, :, 0]  # at every row
     left = weighted[:, :, 0] - (inverse @ (loading @ states[:, :, None]))[:, :, 0]
     same, next_same = _blocks(known)
@@ -62,11 +90,12 @@ def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Arr
     white = expected - left[:, :, None] * left[:, None, :]
     made_up = np.einsum("nia,nia->a", spread, loading)
     column = made_up - np.einsum("ni,nic,nc->c", left, loading, states)
+    at_stamps = states
     if known.first is not None:
-        time_s, states = time_s[known.first], states[known.first]
-    times = _times(same, next_same, states, time_s, constants_s)
+        time_s, at_stamps = time_s[known.first], states[known.first]
+    times = _times(same, next_same, at_stamps, time_s, constants_s)
     squares = float(np.sum(error * left))
-    return Slopes(0.5 * white, column, times, squares, 0.5 * expected, made_up)
+    return Slopes(0.5 * white, column, times, squares, 0.5 * expected, made_up, left, states)
 
 
 def _blocks(known: Precision) -> tuple[Array, Array]:
@@ -107,17 +136,12 @@ def _times(
     same: Array, following: Array, states: Array, time_s: Array, constants_s: Array
 ) -> Array:
     """By the logarithms of the time constants; zero for noise that is new at every stamp."""
-    slow = constants_s > 0.0
-    ratio = np.diff(time_s)[:, None] / np.where(slow, constants_s, 1.0)
-    ratio = np.where(slow, np.maximum(ratio, 1e-9), 50.0)
-    phi, fresh = np.exp(-ratio), -np.expm1(-2.0 * ratio)
-    turned = 2.0 * phi**2 * ratio / fresh**2  # d (1 / fresh)
+    steps = Steps.of(time_s, constants_s)
     square = np.einsum("naa->na", same) + states**2
     cross = following + states[1:] * states[:-1]
-    off = -(phi * ratio / fresh + phi * turned)
-    total: Array = np.sum(turned * (square[1:] + square[:-1] - fresh), axis=0)
-    total += 2.0 * np.sum(off * cross, axis=0)
-    return np.where(slow, 0.5 * total, 0.0)
+    total: Array = np.sum(steps.turned * (square[1:] + square[:-1] - steps.fresh), axis=0)
+    total += 2.0 * np.sum(steps.crossed * cross, axis=0)
+    return np.where(constants_s > 0.0, 0.5 * total, 0.0)
 
 
 def summed_over(white: Array, covariance: Array) -> float:

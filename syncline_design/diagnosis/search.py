@@ -416,6 +416,16 @@ class Search:
         opened = (*model.opened[:-1], Opened(tails[0], "tails"))
         return [Trial(tails[0], replace(model, opened=opened), understated.gain + gain, 2)]
 
+    def at_least(self, model: Model, rival: Model) -> Model:
+        """A model, in the noise of one that seems clearly better where that suits it better.
+
+        Two levels that are as good on the rows they are fitted to may differ on all others.
+        """
+        if not clearly_better(rival, model):
+            return model
+        again = fit(self.data, model.acting, model.opened, start=rival.level)
+        return again if again.nll < model.nll else model
+
     def exchanged(self, model: Model, before: Model) -> Model:
         """Try the rivals of every earlier effect that its new company moves, in its place."""
         for one in moved(model, before):
@@ -429,6 +439,7 @@ class Search:
                 if s.candidate.effect.kind == "stochastic":
                     continue
                 trial = self.trial(without, s, level)
+                model = self.at_least(model, trial.model)
                 if plausible(self.data, trial.model) and clearly_better(trial.model, model):
                     model = trial.model
                     break
