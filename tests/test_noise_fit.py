@@ -85,7 +85,7 @@ def test_a_bent_valley_in_a_box_is_followed_to_its_end(high: float) -> None:
             return None
         return CostHere(float(rosen(place)), rosen_der(place), lambda: bend(place))
 
-    place, value = least(look, start, box, 1e-8, 200)
+    place, value = least(look, start, box, lambda _: 1e-8, 200)
     wanted = minimize(rosen, start, jac=rosen_der, method="L-BFGS-B", bounds=np.array(box).T)
     assert value == pytest.approx(wanted.fun, abs=1e-4)
     assert place == pytest.approx(wanted.x, abs=1e-2)

@@ -39,13 +39,13 @@ def least(
     look: Callable[[Array], CostHere | None],
     start: Array,
     box: tuple[Array, Array],
-    worth: float,
+    worth: Callable[[float], float],
     most: int,
 ) -> tuple[Array, float]:
     """Where the cost is least, as near as a step is worth it, and the cost there.
 
     look: the cost at a place, None where it has none; worth: gain below which a step is not worth
-    it; most: looks at most.
+    it, once so much was gained; most: looks at most.
     """
     first = look(start)
     if first is None:
@@ -54,8 +54,9 @@ def least(
     longer = 0
     for _ in range(most):
         step, promised = path.step(box, path.reach)
-        if promised < worth:
-            if longer == OUT_OF_WAY or path.step(box, REACH)[1] < worth:
+        least_gain = worth(first.value - path.here.value)
+        if promised < least_gain:
+            if longer == OUT_OF_WAY or path.step(box, REACH)[1] < least_gain:
                 break
             path.lengthened(again=longer == 0)
             longer += 1

@@ -127,7 +127,9 @@ class Precision:
         if self.first is not None:
             right = summed(self.first, right)
         if c < _MANY:
-            found: Array = cho_solve_banded((self.factor, True), right.reshape(-1, c))
+            found: Array = cho_solve_banded(
+                (self.factor, True), right.reshape(-1, c), check_finite=False
+            )
             states = found.reshape(-1, m, c)
         else:
             states = self._side_by_side(right)

@@ -6,6 +6,7 @@ fitted again after every change of the effects, as what it absorbs depends on wh
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -146,37 +147,49 @@ def fit(
     acting: Sequence[Acting] = (),
     opened: Sequence[Opened] = (),
     start: NoiseLevel | None = None,
-    passes: int = 1,
+    against: float = math.inf,
 ) -> Model:
-    """Fit the parameters of the effects and the noise, in turn.
+    """Fit the parameters of the effects, then the noise, then the effects once more.
 
     Without a start the noise is fitted from the spec's; with one, the effects are adjusted at that
     noise first, so that what they explain is not taken for noise.  It is fitted on some of the
-    rows, and stays what it was where that suits all of them better.
+    rows, and stays what it was where that suits all of them better.  against: NLL [nat] of what it
+    is held against; how far behind that it is need not be known well.
     """
     bounds = bounds_of(data, opened)
     sizes = tuple(o.directed for o in opened if o.directed >= 0)
     level = start or first_guess(data.structure)
-    now, columns = tuple(acting), None
-    error = data.error(now)
-    looks = LONG if start is None else SHORT
-    for _ in range(passes):
-        known = precision(data.structure, level)
-        before = stepped(data, now, known, error)
-        now, error, columns = before.acting, before.error, before.columns
-        scatter = (error - known.constant_part(error))[data.noise_rows]
-        starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
-        fits = [fit_noise(data.noise_structure, scatter, bounds, s, sizes, looks) for s in starts]
-        old, (level, _) = level, min(fits, key=lambda found: found[1])
     factored = precision(data.structure, level)
-    found = stepped(data, now, factored, error, columns=columns)
+    found = stepped(data, tuple(acting), factored, data.error(acting))
     nll = factored.likelihood_of(found.squares)
-    if bounds.hold(old, sizes) and known.likelihood_of(before.squares) < nll:
-        level, factored, found = old, known, before
-        nll = known.likelihood_of(before.squares)
+    starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
+    scatter = found.error - factored.constant_part(found.error)
+    fitted = _fitted_noise(data, scatter, starts, bounds, sizes, nll - against)
+    known = precision(data.structure, fitted)
+    after = stepped(data, found.acting, known, found.error, columns=found.columns)
+    if not (bounds.hold(level, sizes) and nll < known.likelihood_of(after.squares)):
+        level, factored, found = fitted, known, after
+    nll = factored.likelihood_of(found.squares)
     return Model(
         found.acting, tuple(opened), bounds, level, nll, found.covariance, found.error, factored
     )
+
+
+def _fitted_noise(
+    data: Data,
+    scatter: Array,
+    starts: Sequence[NoiseLevel],
+    bounds: Bounds,
+    sizes: tuple[int, ...],
+    behind: float,
+) -> NoiseLevel:
+    """The likeliest level on the rows that noise is fitted on; behind: nat, over all rows."""
+    looks = LONG if len(starts) > 1 else SHORT
+    behind *= len(data.noise_rows) / len(data.view)
+    own, structure = scatter[data.noise_rows], data.noise_structure
+    fits = [fit_noise(structure, own, bounds, one, sizes, looks, behind) for one in starts]
+    level, _ = min(fits, key=lambda found: found[1])
+    return level
 
 
 def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:

@@ -93,8 +93,10 @@ def competed(
             if a.cosine > (like if a.acts_always else NEAR) or a.fit < RIVAL_NATS]  # fmt: skip
     near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]
     rest = without(model, label)
-    fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)
-            for a in near}  # fmt: skip
+    fits = {
+        label: with_effect(data, rest, found[label], rest.level, against=model.nll)
+        for label in (a.candidate.label for a in near)
+    }
     charges = {one: charge(data, fitted, one, model) for one, fitted in fits.items()}
     charges[label] = charge(data, model, label, model)
     best = _best(data, model, label, fits, charges)

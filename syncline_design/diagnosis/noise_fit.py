@@ -36,6 +36,7 @@ FACTOR_LEAST = 0.05
 LEAST_BEND = 1e-3  # [nat] along any logarithm, of which the log may tell nothing
 WORTH = 0.1  # nat that a step has to promise
 LOOKS = 40
+BEHIND = 2e-3  # of how far one fit is behind another, to which that matters
 
 
 class Packing:
@@ -307,11 +308,13 @@ def fit_noise(
     start: NoiseLevel,
     free_sizes: tuple[int, ...] = (),
     looks: int = LOOKS,
+    behind: float = 0.0,
 ) -> tuple[NoiseLevel, float]:
     """Noise level of largest likelihood within bounds, and the NLL [nat] reached (no prior in it).
 
     error (n, 3) [m] on the structure's rows, which holds no errors of a survey; free_sizes: which
-    directed parts are fitted; looks: at levels, at most.
+    directed parts are fitted; looks: at levels, at most; behind: nat by which what is
+    fitted is behind what it is held against, and known to BEHIND of that and no better.
     """
     packing = Packing(structure, bounds, free_sizes)
 
@@ -326,7 +329,10 @@ def fit_noise(
         slope = packing.slopes(level, found)
         return CostHere(total, slope, lambda: packing.bend(level, known, found))
 
+    def worth(gained: float) -> float:
+        return max(WORTH, BEHIND * (behind - gained))
+
     low, high = np.array(packing.limits()).T
-    place, total = least(look, packing.pack(start), (low, high), WORTH, looks)
+    place, total = least(look, packing.pack(start), (low, high), worth, looks)
     level = packing.unpack(place)
     return level, total - packing.prior(level)

@@ -19,6 +19,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import chi_square_limit
 
 BINS = 6
+TOGETHER = 12  # cells whose columns are solved at once
 SMOOTH_S, LEAST_HALF = 3.0, 3
 STRONG = 4.0  # a cell's score that is worth showing
 AXES = ("north", "east", "down", "along", "across", "forward", "right", "body_down")
@@ -94,9 +95,9 @@ def where_maps(
     numerators = [np.einsum("nij,ni->nj", axes, own) for own in weighted]
     plain = [np.einsum("nij,ni->nj", axes, np.nan_to_num(error)) for error in errors]
     found: list[list[Regime]] = [[] for _ in errors]
-    for covariate, low, high, inside in _cells(view):
-        columns = axes * inside[:, None, None]
-        own = np.einsum("nij,nij->j", columns, known.solve(columns))
+    asked = list(_cells(view))
+    sizes = _own_sizes(known, axes, [inside for *_, inside in asked])
+    for (covariate, low, high, inside), own in zip(asked, sizes, strict=True):
         count, unit = int(np.sum(inside)), covariate.unit
         for cells, numerator, values in zip(found, numerators, plain, strict=True):
             for k, axis in enumerate(AXES):
@@ -105,6 +106,17 @@ def where_maps(
                     mean = float(np.mean(values[inside, k]))
                     cells.append(Regime(covariate.name, low, high, unit, axis, score, mean, count))
     return tuple(tuple(cells) for cells in found)
+
+
+def _own_sizes(known: Precision, axes: Array, cells: Sequence[NDArray[np.bool_]]) -> Array:
+    """x' C^-1 x of every axis in every cell, (cells, axes): some cells' columns side by side."""
+    found = []
+    for at in range(0, len(cells), TOGETHER):
+        inside = np.stack(cells[at : at + TOGETHER], axis=1).astype(float)
+        columns = (axes[:, :, None, :] * inside[:, None, :, None]).reshape(len(axes), 3, -1)
+        own = np.einsum("nij,nij->j", columns, known.solve(columns))
+        found.append(own.reshape(-1, axes.shape[2]))
+    return np.concatenate(found) if found else np.zeros((0, axes.shape[2]))
 
 
 def _cells(view: Scene) -> Iterator[tuple[Covariate, float, float, NDArray[np.bool_]]]:

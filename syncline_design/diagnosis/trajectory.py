@@ -90,9 +90,16 @@ class SplinePieces:
 
 def pieces(time_s: Array, series: Array) -> SplinePieces:
     """Splines of a series (n, k) over rising stamps, cut at gaps; one value a stamp, the mean."""
+    both = (np.ascontiguousarray(values, dtype=float).tobytes() for values in (time_s, series))
+    return _pieces(*both, series.shape[1])
+
+
+@lru_cache(maxsize=8)  # the same velocities and rates, whichever gross fault is undone
+def _pieces(time_bytes: bytes, series_bytes: bytes, width: int) -> SplinePieces:
     from scipy.interpolate import CubicSpline
 
-    time_s, series = per_stamp(time_s, series)
+    series = np.frombuffer(series_bytes).reshape(-1, width)
+    time_s, series = per_stamp(np.frombuffer(time_bytes), series)
     step = np.diff(time_s)
     cuts = np.flatnonzero(step > GAP_FACTOR * np.median(step)) + 1
     bounds = [0, *cuts.tolist(), time_s.shape[0]]

@@ -61,8 +61,13 @@ def log_chance(effect: Effect, gain: float, freedom: int) -> float:
     return min(log_p_of(2.0 * gain, freedom) + math.log(places * stretches), 0.0)
 
 
-def with_effect(data: Data, model: Model, found: Signature, level: NoiseLevel) -> Model:
-    """The model with one more effect that moves the mean, fitted from zero by re-simulation."""
+def with_effect(
+    data: Data, model: Model, found: Signature, level: NoiseLevel, against: float = math.inf
+) -> Model:
+    """The model with one more effect that moves the mean, fitted from zero by re-simulation.
+
+    against: NLL of what it is held against [nat], see `fit`.
+    """
     values = {**zero_values(found.candidate.effect, found.at), **found.start}
     start = found.candidate.acting(values)
     opened = model.opened
@@ -70,11 +75,11 @@ def with_effect(data: Data, model: Model, found: Signature, level: NoiseLevel) -
         directed = directed_index(data, found.candidate)
         opened = (*opened, Opened(found.candidate, "size", directed))
         level = with_size(level, directed, 0.3 * usual_noise_size(data, directed))
-    fitted = fit(data, (*model.acting, start), opened, start=level)
+    fitted = fit(data, (*model.acting, start), opened, start=level, against=against)
     if not found.at:
         return fitted
     placed = located(data, fitted)  # in the noise that a step at the wrong place leaves
-    return fit(data, placed.acting, opened, start=placed.level)
+    return fit(data, placed.acting, opened, start=placed.level, against=against)
 
 
 def plausible(data: Data, model: Model) -> bool:
