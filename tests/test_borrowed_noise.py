@@ -22,6 +22,7 @@ from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import data_of, fit
 from syncline_design.diagnosis.noise import as_specified, first_guess, precision, spec_bounds
 from syncline_design.diagnosis.noise_fit import fit_noise
+from syncline_design.diagnosis.scatter import unforetold
 from syncline_design.diagnosis.scene import Scene, acting, scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.spec.load import load
@@ -146,3 +147,11 @@ def test_two_heights_that_undo_each_other_are_no_causes(
     found = cancelling(data, model, spreads, POSITION_M * np.sqrt(3.0))
     first, second = (one.label for one in causes)
     assert found == ({first: second, second: first} if undone else {})
+
+
+def test_the_noise_of_places_is_told_across_gaps_of_days() -> None:
+    """Windows of a long log: three neighbours beyond a gap are in one place to all purposes."""
+    rng = np.random.default_rng(2)
+    time_s = np.concatenate([k * 1e6 + 0.1 * np.arange(500.0) for k in range(4)])
+    place_m = np.sin(0.3 * time_s)[:, None] + 0.02 * rng.standard_normal((len(time_s), 1))
+    assert unforetold(time_s, place_m) == pytest.approx(0.02, rel=0.1)
