@@ -19,7 +19,7 @@ from syncline_design.diagnosis.plotted import (
     Residuals,
     Spectrum,
 )
-from syncline_design.diagnosis.remainder_plots import normal_of, spectrum_of, track_of
+from syncline_design.diagnosis.remainder_plots import _powers, normal_of, spectrum_of, track_of
 from syncline_design.report import charts_residuals as drawings
 from syncline_design.report.document import Chart
 from syncline_design.report.on_residuals import residual_nodes
@@ -133,3 +133,14 @@ def test_the_caption_names_what_the_residuals_changed_with_and_every_figure_draw
         assert "<svg" in drawn.svg
     middles = drawings.binned(tuple(speed), tuple(0.1 * speed))
     assert all(size == pytest.approx(0.1 * middle, rel=0.02) for middle, size in middles)
+
+
+def test_the_powers_of_a_spectrum_are_those_of_every_frequency_by_itself() -> None:
+    """At uneven stamps, 300 frequencies: more than are taken at once."""
+    rng = np.random.default_rng(6)
+    share, series = np.sort(rng.uniform(0.0, 1.0, 700)), rng.standard_normal((700, 2))
+    wanted = [
+        np.mean(np.abs(np.sum(np.exp(2j * np.pi * k * share)[:, None] * series, axis=0)) ** 2) / 700
+        for k in range(1, 301)
+    ]
+    np.testing.assert_allclose(_powers(share, series, 300), wanted, rtol=1e-9)

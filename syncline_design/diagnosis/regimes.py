@@ -19,7 +19,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import chi_square_limit
 
 BINS = 6
-TOGETHER = 12  # cells whose columns are solved at once
+TOGETHER = 36_000  # rows of cells whose columns are solved at once
 SMOOTH_S, LEAST_HALF = 3.0, 3
 STRONG = 4.0  # a cell's score that is worth showing
 AXES = ("north", "east", "down", "along", "across", "forward", "right", "body_down")
@@ -111,8 +111,9 @@ def where_maps(
 def _own_sizes(known: Precision, axes: Array, cells: Sequence[NDArray[np.bool_]]) -> Array:
     """x' C^-1 x of every axis in every cell, (cells, axes): some cells' columns side by side."""
     found = []
-    for at in range(0, len(cells), TOGETHER):
-        inside = np.stack(cells[at : at + TOGETHER], axis=1).astype(float)
+    count = max(TOGETHER // len(axes), 1)
+    for at in range(0, len(cells), count):
+        inside = np.stack(cells[at : at + count], axis=1).astype(float)
         columns = (axes[:, :, None, :] * inside[:, None, :, None]).reshape(len(axes), 3, -1)
         own = np.einsum("nij,nij->j", columns, known.solve(columns))
         found.append(own.reshape(-1, axes.shape[2]))

@@ -24,6 +24,7 @@ from syncline_design.model.figure_text import rounded
 ARROWS = 60  # stretches of the log, an arrow each
 BANDS = 60  # of the spectrum
 LEAST_ROWS = 32
+AT_ONCE = 128  # frequencies
 SHARES = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, *(k / 20 for k in range(2, 10)), 0.5)
 DIGITS = 6
 
@@ -76,10 +77,7 @@ def spectrum_of(data: Data, result: SearchResult) -> Spectrum | None:
     series = series - series.mean(axis=0)
     time_s = time_s - time_s[0]
     cycles = np.arange(1, count // 2) / time_s[-1]
-    power = np.zeros(cycles.size)
-    for part in np.array_split(np.arange(cycles.size), max(cycles.size // 300, 1)):
-        turned = np.exp(2j * np.pi * cycles[part, None] * time_s)
-        power[part] = np.mean(np.abs(turned @ series) ** 2, axis=1) / count
+    power = _powers(time_s / time_s[-1], series, cycles.size)
     ends = np.unique(np.geomspace(1, cycles.size + 1, BANDS + 1).astype(int)) - 1
     bands = list(itertools.pairwise(ends))
     wide = np.array([b - a for a, b in bands])
@@ -88,6 +86,20 @@ def spectrum_of(data: Data, result: SearchResult) -> Spectrum | None:
     mean = [float(np.mean(power[a:b])) for a, b in bands]
     at = [float(np.sqrt(cycles[a] * cycles[b - 1])) for a, b in bands]
     return Spectrum(listed(np.array(at)), listed(np.array(mean)), listed(limit))
+
+
+def _powers(share: Array, series: Array, most: int) -> Array:
+    """Mean of |sum_t s_t exp(2 pi i k share_t)|^2 / n over a series (n, a), k = 1 to most.
+
+    Turns of AT_ONCE frequencies are made once, and turned on by the first one of every lot.
+    """
+    count = min(AT_ONCE, most)
+    turns = np.exp(2j * np.pi * np.arange(count)[:, None] * share)
+    power = [
+        np.mean(np.abs(turns @ (np.exp(2j * np.pi * first * share)[:, None] * series)) ** 2, axis=1)
+        for first in range(1, most + 1, count)
+    ]
+    return np.concatenate(power)[:most] / len(series)
 
 
 def normal_of(data: Data, result: SearchResult) -> NormalPlot:

@@ -70,7 +70,9 @@ class States:
     seen: NDArray[np.int64] | None  # (n,) group of targets of every row, where they are few
     roles: tuple[Channel, ...]  # sensor of every channel, and which of its readings
     explained: Array | None = None  # (n, 3, f) what effects could make of the error
-    kept: LastMade[HeldFixed] = field(default_factory=LastMade, repr=False, compare=False)
+    kept: LastMade[HeldFixed] = field(
+        default_factory=lambda: LastMade(1), repr=False, compare=False
+    )
 
     @property
     def count(self) -> int:
