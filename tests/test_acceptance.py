@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -352,6 +353,20 @@ def test_a_spec_of_several_missions_is_refused_at_its_place() -> None:
     line = int(done.stderr.split("uav_three_heights.yaml:")[1].split(":")[0])
     assert line in (at, at + 1)
     assert "give it a spec of one mission" in done.stderr
+
+
+def test_a_figure_and_its_interval_end_at_the_same_place(late: Acceptance) -> None:
+    """`1.0427 (0.9111 to 1.1595)`, in one unit; a departure that was not found is a plain 0."""
+    words = render_acceptance("html", late).replace("\u00a0", " ")
+    number = r"\u2212?(\d+\.?\d*)( \S+)?"
+    found = re.findall(rf"<bdi>{number} \({number} to {number}\)</bdi>", words)
+    assert len(found) > 5
+    for value, unit, low, low_unit, high, high_unit in found:
+        ends = [len(text.partition(".")[2]) for text in (low, high)]
+        assert ends == [ends[0]] * 2
+        assert value == "0" or len(value.partition(".")[2]) == ends[0]
+        assert low_unit == high_unit
+        assert value == "0" or unit == low_unit
 
 
 def test_every_format_says_the_same(late: Acceptance) -> None:

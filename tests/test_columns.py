@@ -33,7 +33,11 @@ def _spaced(texts: list[str]) -> list[str]:
         ([("10 ns", 1e-8), ("24.16 us", 2.416e-5)], ["10.00 ns", "24.16 us"]),
         ([("12 us", 1.2e-5), ("10 ns", 1e-8)], ["12 us", "10 ns"]),
         # what adds up has one unit
-        ([("12 g", 0.012), ("2.21 kg", 2.21), ("0 kg", 0.0)], ["0.012 kg", "2.210 kg", "0.000 kg"]),
+        ([("12 g", 0.012), ("2.21 kg", 2.21), ("0 kg", 0.0)], ["0.012 kg", "2.210 kg", "0 kg"]),
+        # nothing has no digits to be compared by; an amount of money goes to the cent all the same
+        ([("12 g", 0.012), ("0 kg", 0.0)], ["12 g", "0 g"]),
+        ([("0 W", 0.0), ("1.6 W", 1.6), ("12 W", 12.0)], ["0 W", "1.6 W", "12.0 W"]),
+        ([("0 EUR", 0.0), ("1.50 EUR", 1.5)], ["0.00 EUR", "1.50 EUR"]),
         ([("500 mW", 0.5), ("12.25 W", 12.25)], ["0.50 W", "12.25 W"]),
         # money to the cent or to the whole, whatever its size
         ([("900 EUR", 900.0), ("59 862.35 EUR", 59862.35)], ["900.00 EUR", "59 862.35 EUR"]),

@@ -96,6 +96,22 @@ def test_the_answer_is_on_the_first_screen(browser: Any, tmp_path: Path, kind: s
                 assert max(ends) <= 900, (width, part, ends)
 
 
+@pytest.mark.browser
+def test_offsets_and_sessions_of_a_clock_share_a_row(browser: Any, tmp_path: Path) -> None:
+    """No third of the card is left to a caption: two figures beside one another fill it."""
+    path = tmp_path / "page.html"
+    path.write_text(html(on_timing(timed(tmp_path, 4))), encoding="utf-8")
+    boxes = "all => all.map(e => e.getBoundingClientRect()).map(b => [b.left, b.width, b.top])"
+    with Opened(browser, path, viewport={"width": 1300, "height": 900}) as opened:
+        (card,) = opened.page.eval_on_selector_all("#offsets", boxes)
+        (left, one, top), (right, other, beside) = opened.page.eval_on_selector_all(
+            "#offsets figure svg", boxes
+        )
+    assert right > left + one
+    assert abs(top - beside) < 20
+    assert one + other > 0.9 * card[1]
+
+
 def test_what_it_means_stands_before_what_it_rests_on(tmp_path: Path) -> None:
     parts = [part.key for part in on_timing(timed(tmp_path)).sections]
     assert parts.index("spec") < parts.index("claim") < parts.index("offsets")

@@ -28,6 +28,7 @@ from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.comparison.diff import diff
 from syncline_design.comparison.meaning import with_design
 from syncline_design.logs.inspection import inspect_logs
+from syncline_design.report.document import Document, Outcome, section, show
 from syncline_design.report.on_acceptance import on_acceptance
 from syncline_design.report.on_audit import on_audit
 from syncline_design.report.on_diagnosis import on_diagnosis
@@ -39,6 +40,7 @@ from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
 from syncline_design.report.studies import render_study
+from syncline_design.report.table import table
 from syncline_design.spec.load import load, load_text
 from syncline_design.studies import StudySettings, run_study
 from syncline_design.verdict.cloud import cloud
@@ -494,3 +496,19 @@ def test_injected_script_is_stopped_by_the_policy(browser: Any, tmp_path: Path) 
         assert opened.page.evaluate("() => window.owned") is None
         assert opened.failed == {"https://example.invalid/x.png": "csp"}
         assert len(opened.console) == 2  # the browser reports both refusals
+
+
+def test_a_table_of_short_figures_fits_a_phone(browser: Any, tmp_path: Path) -> None:
+    """The targets of a drive: rows, not a card of four lines each, and nothing is cut."""
+    path = tmp_path / "page.html"
+    rows = [[str(k), f"-{100.5 + k}", f"{10.5 + k}", "-1.6"] for k in range(36)]
+    heads = ("Target", "North [m] #", "East [m] #", "Down [m] #")
+    part = section("targets", "Targets", show(table("Targets", heads, rows)))
+    path.write_text(
+        html(Document("x", Outcome("good", "x", "x"), "x", (), (), tuple(part))), "utf-8"
+    )
+    with Opened(browser, path, viewport={"width": 420, "height": 900}) as opened:
+        frame = opened.page.locator("#targets .scroll")
+        assert frame.evaluate("e => e.scrollWidth - e.clientWidth") == 0
+        row = opened.page.locator("#targets tbody tr").first
+        assert row.evaluate("e => getComputedStyle(e).display") == "table-row"

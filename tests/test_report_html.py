@@ -385,6 +385,21 @@ def test_tables_that_a_tablet_has_no_room_for_are_told() -> None:
         assert ('class="scroll cards wide' in page) is wide
 
 
+def test_a_table_of_one_column_names_no_row_and_one_of_short_figures_stays_a_table() -> None:
+    """A list is not all in bold; four short columns fit a phone, and no card has one figure."""
+    heads = ("Target", "North [m] #", "East [m] #", "Down [m] #")
+    short, long = ["1", "2.5", "3.5", "4.5"], ["1", *3 * ["65 000.00 EUR"]]
+    for one, named, cards in (
+        (table("x", ["Change"], [["limit 2 m to 1 m"], ["platform car to van"]]), False, False),
+        (table("x", heads, [short]), True, False),
+        (table("x", heads, [long]), True, True),
+    ):
+        part = section("part", "Part", show(one))
+        page = html(Document("x", Outcome("good", "x", "x"), "x", (), (), tuple(part)))
+        assert ('<th scope="row"' in page) is named
+        assert ('class="scroll cards' in page) is cards
+
+
 @pytest.mark.parametrize(("old", "new", "word"), [
     ("limit: 50 cm", "limit: 50 cm", "meets"),
     ("limit: 50 cm", "limit: 5 cm", "fails"),

@@ -6,6 +6,7 @@ import json
 import random
 import re
 from dataclasses import replace
+from decimal import ROUND_HALF_DOWN, ROUND_HALF_UP, Context, Decimal
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from syncline_design.report.on_study import on_study
 from syncline_design.report.render_console import console
 from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.studies import render_study
-from syncline_design.report.study_words import MOST_ACROSS, heat_table
+from syncline_design.report.study_words import MOST_ACROSS, heat_table, winners_table
 from syncline_design.studies import StudyResult, StudySettings, run_study
 from syncline_design.studies.scatter import scatter
 from syncline_design.studies.summary import HeatMap, heat_map, summarise
@@ -81,6 +82,21 @@ def test_a_sample_is_points_and_never_a_grid_with_empty_cells(tmp_path: Path, co
     page = str(render_study("html", result))
     assert "no case meets" not in page
     assert "Least cost" not in console(on_study(result))
+
+
+def test_where_a_sensor_wins_has_the_digits_that_its_cases_have(tmp_path: Path) -> None:
+    """Drawn values to four figures, here by decimal arithmetic, in that table as in the cases."""
+    result = done(tmp_path, SAMPLE.format(count=40, more=""))
+    labels = [text.split() for case in result.cases() for text in case.labels.values()]
+    listed = {
+        f"{Context(4, tie).plus(Decimal(figure)).normalize():f} {unit}"
+        for figure, unit in labels for tie in (ROUND_HALF_UP, ROUND_HALF_DOWN)
+    }  # fmt: skip
+    rows = winners_table(summarise(result)).rows
+    ends = [end for row in rows for cell in row[4:] for end in re.split(" to |, ", cell.text)]
+    told = {end.replace("\u00a0", " ") for end in ends} - {"everywhere", "..."}
+    assert len(told) > 2
+    assert told <= listed
 
 
 def test_named_axes_and_words_are_kept(tmp_path: Path) -> None:

@@ -131,7 +131,13 @@ def _in_one_unit(together: Sequence[_Figure]) -> Sequence[_Figure]:
 
 
 def _decimals(together: Sequence[_Figure]) -> list[int]:
-    """How many decimals each of these figures takes."""
+    """How many decimals each of these figures takes; nothing at all is `0 W`, whatever the rest."""
+    shown = [one for one in together if one.value or one.is_money]
+    found = iter(_of_amounts(shown) if shown else [])
+    return [next(found) if one.value or one.is_money else 0 for one in together]
+
+
+def _of_amounts(together: Sequence[_Figure]) -> list[int]:
     most = max(one.decimals for one in together)
     if not most or not any(one.value for one in together):
         return [most] * len(together)

@@ -15,6 +15,7 @@ from syncline_design.comparison.acceptance import (
 )
 from syncline_design.report import numbers
 from syncline_design.report.ci import Level, Notice
+from syncline_design.report.columns import alike
 from syncline_design.report.document import (
     Document,
     Items,
@@ -149,11 +150,14 @@ def _figure(value: float | None, unit: str) -> str:
 
 
 def _measured(row: AssumptionResult) -> str:
+    """`87.0 ms (86.7 ms to 87.2 ms)`: figure and interval to the same place."""
     found = row.measured or MeasuredFigure(None)
     text = _figure(found.value, row.unit)
     if found.low is None or found.high is None:
         return text
-    return f"{text} ({_figure(found.low, row.unit)} to {_figure(found.high, row.unit)})"
+    three = (found.value, found.low, found.high)
+    text, low, high = alike([(_figure(value, row.unit), value) for value in three])
+    return f"{text} ({low} to {high})"
 
 
 def _table(result: Acceptance) -> Table:

@@ -359,7 +359,7 @@ def _targets(found: Plan) -> list[Node]:
         )
         for t in found.targets
     ]
-    heads = ("Target", "North, m #", "East, m #", "Down, m #")
+    heads = ("Target", "North [m] #", "East [m] #", "Down [m] #")
     whole: Table = table("Targets", heads, rows)
     few: Table = table("Targets", heads, rows[:MOST_TARGETS])
     more = len(rows) - MOST_TARGETS
@@ -376,5 +376,9 @@ def _rests(found: Plan) -> list[Node]:
 
 
 def _provenance(found: Plan) -> list[tuple[str, str]]:
-    known = found.provenance.to_json().items()
-    return [("Spec file", found.spec.file), *((k.replace("_", " "), str(v)) for k, v in known)]
+    known = found.provenance
+    return [
+        ("Spec file", found.spec.file), ("syncline-design", known.version),
+        ("Spec, SHA-256", known.spec_sha256), ("Catalogs, SHA-256", known.catalogs_sha256),
+        ("Seed", str(known.seed)),
+    ]  # fmt: skip

@@ -28,6 +28,7 @@ from syncline_design.report.study_words import (
     heat_table,
     outcome,
     rule_sentence,
+    shown_value,
     winners_table,
 )
 from syncline_design.report.svg import InlineChart
@@ -251,17 +252,6 @@ def _setting_cells(brief: Brief, several: list[tuple[int, Factor]]) -> list[Cell
     if len(several) <= MOST_KEYS:
         return [Cell(shown_value(f, brief.labels[i]), _figure(brief, i)) for i, f in several]
     return [Cell("; ".join(f"{f.key} = {shown_value(f, brief.labels[i])}" for i, f in several))]
-
-
-def shown_value(factor: Factor, label: str) -> str:
-    """A value as it was listed; one that was drawn to four figures, in full in CSV and JSON.
-
-    Shares and amounts of money stay as they are.
-    """
-    found = figure_of(plain_scalar(label)) if factor.origin == "sample" else None
-    if found is None or found[1].isupper() or "%" in label:
-        return label
-    return numbers.like(label, found[0])
 
 
 def _provenance(result: StudyResult) -> list[tuple[str, str]]:

@@ -68,7 +68,8 @@ def on_timing(result: TimingAndSpec) -> Document:
             *section("spec", "What it means for the spec", _spec(result), "Spec"),
             *section("claim", "What may be claimed", _claim(result), "Claim"),
             *section("entry", "Catalog entry", _entry(result), "Entry"),
-            *section("offsets", "Offset over time", _offsets(result), "Offsets"),
+            *section("offsets", "Offset over time and by session",
+                     [*_offsets(result), *_by_session(result)], "Offsets"),
             *section("sessions", "Sessions", _sessions(result)),
             *section("events", "Events", _events(result)),
             *section("noise", "Kind of noise", _noise(result), "Noise"),
@@ -292,7 +293,7 @@ def _offsets(result: Timing) -> list[Node]:
     return [Chart("offsets", draw, words)]
 
 
-def _sessions(result: Timing) -> list[Node]:
+def _by_session(result: Timing) -> list[Node]:
     counted = [(k, one) for k, one in enumerate(result.sessions) if one.counted and one.quantile_s]
     both = (("statistical", result.statistical_bound_s), ("hard", result.hard_bound_s))
     bounds = [(name, value) for name, value in both if value]
@@ -300,12 +301,15 @@ def _sessions(result: Timing) -> list[Node]:
     def draw() -> InlineChart:
         return sessions(counted, result.claim.coverage, bounds)
 
-    chart: list[Node] = [Chart("sessions", draw, "One dot a session.")] if counted else []
+    return [Chart("sessions", draw, "One dot a session.")] if counted else []
+
+
+def _sessions(result: Timing) -> list[Node]:
     every = show(_session_table(result, 10_000), silent=True, reach="page")
     if len(result.sessions) > _MOST_OPEN:
         summary = f"Every session ({numbers.count(len(result.sessions))} rows)"
         every = [Group(tuple(every), "fold", summary=summary, reach="page")]
-    return [*chart, *every, *show(_session_table(result, _MOST_ROWS), silent=True, reach="text")]
+    return [*every, *show(_session_table(result, _MOST_ROWS), silent=True, reach="text")]
 
 
 def _session_table(result: Timing, most: int) -> Table:

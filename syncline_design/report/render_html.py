@@ -26,6 +26,7 @@ _TEMPLATES: Final = "syncline_design.templates"
 MOST_VALUES: Final = 200  # rows of the table below a figure; more are shown one by one
 _LINE: Final = 30  # characters of a column that holds sentences
 _TABLET: Final = 92  # characters in a line of a table there
+_PHONE: Final = 48
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 
 
@@ -91,7 +92,9 @@ def _environment() -> Environment:
     )
     environment.filters["spans"] = spans
     environment.filters["bare"] = unticked
-    environment.tests["wide"] = _is_wide
+    environment.tests["wide"] = lambda shown: _needed(shown) > _TABLET
+    environment.tests["narrow"] = lambda shown: _needed(shown) <= _PHONE
+    environment.tests["wordy"] = _is_wordy
     environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
     environment.filters["points"] = _points
@@ -128,15 +131,20 @@ def _labels(figure: InlineChart) -> list[str]:
     return list(dict.fromkeys(label for t in figure.told for label in t.says))
 
 
-def _is_wide(shown: Table) -> bool:
-    """Whether a table needs more than a tablet has: words may break into lines, figures may not."""
+def _needed(shown: Table) -> int:
+    """Characters in a line of a table: words may break into lines, figures may not."""
     needed = 0
     for column, head in enumerate(shown.heads):
         longest = max((len(row[column].text) for row in shown.rows), default=0)
         words = [head.text] if head.numeric else head.text.split()  # heads of figures stay whole
         longest = longest if head.numeric else min(longest, _LINE)
         needed += 2 + max(longest, *(2 + len(word) for word in words or [""]))  # with its arrow
-    return needed > _TABLET
+    return needed
+
+
+def _is_wordy(shown: Table) -> bool:
+    """Whether the last column holds sentences, which take the width that figures leave."""
+    return any(len(row[-1].text) > _LINE for row in shown.rows)
 
 
 def _soft(text: str) -> str:

@@ -7,6 +7,8 @@ from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
 from syncline_design.report.table import CORNER, Cell, Table, table
 from syncline_design.report.words import OUTCOMES, VERBS
+from syncline_design.spec.yaml_text import plain_scalar
+from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (
     HeatMap,
@@ -118,6 +120,17 @@ def _cost_cell(cost: float | None, currency: str) -> Cell:
     return Cell(numbers.money(cost, currency), cost)
 
 
+def shown_value(factor: Factor, label: str) -> str:
+    """A value as it was listed; one that was drawn to four figures, in full in CSV and JSON.
+
+    Shares and amounts of money stay as they are.
+    """
+    found = figure_of(plain_scalar(label)) if factor.origin == "sample" else None
+    if found is None or found[1].isupper() or "%" in label:
+        return label
+    return numbers.like(label, found[0])
+
+
 def winners_table(summary: StudySummary) -> Table:
     """Which sensor and method is chosen where."""
     several = [factor.key for _, factor in varied(summary)]
@@ -126,11 +139,12 @@ def winners_table(summary: StudySummary) -> Table:
             Cell(w.role), Cell(w.name), Cell(w.timestamping),
             Cell(f"{w.cases} of {w.of}", float(w.cases)), *_where_cells(several, w.where),
         ]
-        for w in winners(summary)
+        for w in winners(summary, shown_value)
     ]  # fmt: skip
     places = [f"At {key}" for key in several] if len(several) <= MOST_KEYS else ["At"]
     heads = ["Role", "Sensor", "Timestamping", "Chosen in #", *places]
-    return table("Which sensor and method wins where, of the cases that meet", heads, rows)
+    caption = "Which sensor and method wins where, of the cases that meet"
+    return table(caption, heads, rows, named_by=1)
 
 
 def _where_cells(keys: list[str], where: tuple[str, ...]) -> list[Cell]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,6 +15,8 @@ from syncline_design.verdict.tree import RequirementResult
 
 MOST_FRONTS = 500
 MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
+
+Shown = Callable[[Factor, str], str]  # a value of a factor as it is to be written
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,8 +203,11 @@ def payload(brief: Brief) -> str:
     return ", ".join(pick.name for pick in brief.picks)
 
 
-def winners(summary: StudySummary) -> list[Winner]:
-    """Options that a meeting case chose, most frequent first within each role."""
+def winners(summary: StudySummary, show: Shown = lambda _, label: label) -> list[Winner]:
+    """Options that a meeting case chose, most frequent first within each role.
+
+    show: how a value of a factor is written; as it is listed where nothing is given.
+    """
     meeting = [brief for brief in summary.briefs if brief.meets]
     held: dict[RolePick, list[Brief]] = {}
     for brief in meeting:
@@ -211,23 +216,24 @@ def winners(summary: StudySummary) -> list[Winner]:
     several = varied(summary)
     roles = list(dict.fromkeys(pick.role for pick in held))
     order = sorted(held, key=lambda p: (roles.index(p.role), -len(held[p]), p.sensor))
-    return [_winner(pick, held[pick], meeting, several) for pick in order]
+    return [_winner(pick, held[pick], meeting, several, show) for pick in order]
 
 
 def _winner(
-    pick: RolePick, choosing: list[Brief], meeting: list[Brief], several: list[tuple[int, Factor]]
-) -> Winner:
+    pick: RolePick, choosing: list[Brief], meeting: list[Brief], several: list[tuple[int, Factor]],
+    show: Shown,
+) -> Winner:  # fmt: skip
     """choosing: the meeting cases that chose it."""
     having = sum(any(p.role == pick.role for p in brief.picks) for brief in meeting)
-    where = tuple(_extent(factor, {b.labels[i] for b in choosing}) for i, factor in several)
+    where = tuple(_extent(one, {b.labels[i] for b in choosing}, show) for i, one in several)
     return Winner(
         pick.role, pick.sensor, pick.name, pick.timestamping, len(choosing), having, where
     )
 
 
-def _extent(factor: Factor, present: set[str]) -> str:
+def _extent(factor: Factor, present: set[str], show: Shown) -> str:
     """`40 m to 80 m`, `everywhere`, or the values one by one."""
-    ordered = [text for text in factor.axis if text in present]
+    ordered = [show(factor, text) for text in factor.axis if text in present]
     if len(ordered) == len(factor.axis):
         return "everywhere"
     if factor.is_of_figures and len(ordered) > 2:
