@@ -3,6 +3,7 @@ effect has to be; and figures as people write them."""
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from dataclasses import replace
@@ -153,3 +154,44 @@ def test_a_pair_that_only_takes_longer_is_not_said_to_hang_on_its_size(tmp_path:
     words = " ".join(done.stdout.split())
     assert "Not reachable in 0.3 min" in words
     assert "only where it is larger" not in words
+
+
+def test_a_stated_height_is_kept_or_refused(tmp_path: Path) -> None:
+    """By plain geometry: d is 40 m, so that from 34 m up targets are in reach and from 60 m none.
+
+    Closer to them than stated, the figures were those of another drive.
+    """
+    stated = ("motion: multirotor", "motion: multirotor, height: 34 m")
+    waypoints = tmp_path / "drive.csv"
+    wanted = ("--reach", "latency(position)=1 ms", "-q", "-o", f"csv:{waypoints}")
+    assert call(spec_with(tmp_path, stated), *wanted).exit_code == 0
+    with waypoints.open(encoding="utf-8", newline="") as stream:
+        rows = [row for row in csv.DictReader(stream) if row["target_down_m"]]
+    above = [float(row["target_down_m"]) - float(row["down_m"]) for row in rows]
+    assert sum(above) / len(above) == pytest.approx(34.0, abs=2.0)
+    away = [
+        math.dist(*([float(row[f"{of}{axis}_m"]) for axis in ("north", "east", "down")]
+                    for of in ("", "target_")))
+        for row in rows
+    ]  # fmt: skip
+    assert max(away) < 40.0
+    done = call(spec_with(tmp_path, (stated[0], "motion: multirotor, height: 60 m")), *wanted)
+    assert done.exit_code == 2, done.output
+    words = " ".join(done.stderr.split())
+    assert "keeps 60 m over its targets, and they are at most 38 m away" in words
+    assert "expected a height of at most 95 % of its distance, 38 m" in words
+
+
+def test_a_height_over_nothing_that_is_ranged_to_is_kept(tmp_path: Path) -> None:
+    """Without a ranging sensor there is no target that could be out of reach."""
+    text = spec_with(tmp_path).read_text(encoding="utf-8")
+    head, _, rest = text.partition("    ranging: {")
+    tail = rest[rest.index("log: {") :]
+    path = tmp_path / "copter.yaml"
+    path.write_text(head.replace("motion: multirotor", "motion: multirotor, height: 60 m") + tail,
+                    encoding="utf-8")  # fmt: skip
+    waypoints = tmp_path / "drive.csv"
+    done = call(path, "--reach", "latency(position)=1 ms", "-q", "-o", f"csv:{waypoints}")
+    assert done.exit_code == 0, done.output
+    with waypoints.open(encoding="utf-8", newline="") as stream:
+        assert float(next(csv.DictReader(stream))["down_m"]) == pytest.approx(-60.0, abs=1.0)

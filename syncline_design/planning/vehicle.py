@@ -25,6 +25,7 @@ MOST_TILT_RAD: Final = math.radians(30.0)
 BELOW: Final = ("mbes", "sonar", "usbl", "echo", "imaging_sonar", "multibeam")
 LONGEST_TURN_S: Final = 3600.0  # a turn about that takes longer is none
 HEIGHT_SHARE: Final = 0.6  # of the range d that the targets lie below
+FAR: Final = 0.95  # of the range d at which targets are at most
 
 
 class Usual(NamedTuple):
@@ -149,6 +150,7 @@ def _vehicle(case: Case, stage: StageCase, ranging_type: str) -> Vehicle:
         tuple(assumed),
     )
     _demand_turns(case, stage, found)
+    _demand_sight(case, stage, found)
     return found
 
 
@@ -176,7 +178,7 @@ def _depth_m(
     Around the vehicle where it is on the ground or afloat and looks through air.
     """
     if height is not None:
-        return min(float(height), 0.95 * distance)
+        return float(height)
     afloat = motion in ("ground", "surface")
     looks_down = any(word in ranging_type for word in BELOW)
     return 0.0 if afloat and not looks_down else HEIGHT_SHARE * distance
@@ -198,6 +200,24 @@ def _demand_turns(case: Case, stage: StageCase, found: Vehicle) -> None:
     most = format_duration(LONGEST_TURN_S)
     why = f"a turn about at {to_digits(found.join_mps, 3)} m/s takes longer than {most}"
     raise _cannot(case, stage, key, "turn", why, f"a turn about within {most}")
+
+
+def _demand_sight(case: Case, stage: StageCase, found: Vehicle) -> None:
+    """BadInput where the stated height leaves every target out of reach: its figures would be of
+    another drive."""
+    height, most = stage.platform.entry.height, FAR * found.distance_m
+    if stage.role("ranging") is None or height is None or float(height) <= most:
+        return
+    flaw = Flaw(
+        str(case.path),
+        *case.position(("stages", stage.index, "platform")),
+        f"stages.{stage.index}.platform.height",
+        f"the platform of stage {stage.choice.name!r} keeps {to_digits(float(height), 4)} m over "
+        f"its targets, and they are at most {to_digits(most, 4)} m away",
+        f"a height of at most {100 * FAR:.0f} % of its distance, {to_digits(most, 4)} m",
+        hint="state the distance at which the sensor is used, or the height at which it is flown",
+    )
+    raise BadInput((flaw,))
 
 
 def _cannot(
