@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import mpmath
 import pytest
 
 from syncline_design.choice.chosen_system import clock_error, system_of, timing_error
-from syncline_design.choice.evaluate import evaluate
+from syncline_design.choice.evaluate import added_up, evaluate
 from syncline_design.choice.option import Option
 from syncline_design.choice.problem import build_problem, selection_of, sole_design, with_everything
 from syncline_design.choice.table import Design, Problem, with_limits
@@ -232,3 +233,17 @@ def test_norm_counts_one_figure_per_axis() -> None:
     assert float(norm(2.0, 3)) == pytest.approx(2.0 * math.sqrt(3.0), rel=1e-15)
     assert norm((3.0, 4.0), 2) == 5
     assert norm(0.0, 2) == 0
+
+
+def test_sums_over_one_denominator_are_those_of_fractions_added_one_by_one() -> None:
+    rng = random.Random(7)
+    for count in (0, 1, 2, 5, 12):
+        for _ in range(50):
+            terms = [
+                rng.choice([Fraction(rng.gauss(0.0, 1e-6)), Fraction(rng.randint(-999, 999), 700)])
+                for _ in range(count)
+            ]
+            one_by_one = Fraction(0)
+            for term in terms:
+                one_by_one += term
+            assert added_up(terms) == one_by_one

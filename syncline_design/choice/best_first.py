@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from syncline_design.choice.arrays import RoleArrays, Scaled, tabulate
-from syncline_design.choice.evaluate import Amount, broken, error_key, evaluate, rank
+from syncline_design.choice.evaluate import Amount, broken, error_key, evaluate
 from syncline_design.choice.option import ResourceName
 from syncline_design.choice.options import MARGIN, RESOURCES, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline, TooLarge
@@ -25,7 +25,8 @@ from syncline_design.choice.table import Design, Problem, VehicleTable, is_empty
 from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_ROWS = 2_000_000  # options in the blocks of a search: about 200 MB
-Key = tuple[Amount, float, Amount, Amount, Amount, tuple[int, ...]]
+Whole = int | float  # an amount in whole units, which compare quicker than fractions; infinite
+Key = tuple[Whole, float, Whole, Whole, Whole, tuple[int, ...]]
 
 
 def iter_first(
@@ -144,13 +145,16 @@ class BestFirstSearch:
 
     def bound(self) -> Amount:
         """What no design can go below in the objective (infinite: there is none)."""
-        least: Amount = math.inf
+        least: Whole = math.inf
         ranges = [range(len(v.clocks)) for v in self.problem.vehicles]
         for clocks in itertools.product(*ranges):
             block = self._expand(_Node(clocks, (), 0.0, self._clock_sums(clocks)))
             for place in block.order.tolist():
                 least = min(least, self._key(block, place)[0])
-        return least
+        scale = self.scales[self.main]
+        if self.problem.objective == "error" or scale is None or isinstance(least, float):
+            return least
+        return Fraction(least, scale.denominator)
 
     def _clock_sums(self, clocks: tuple[int, ...]) -> tuple[int | float, ...]:
         chosen = [
@@ -285,15 +289,16 @@ class BestFirstSearch:
 
     def _key(self, block: _Block, place: int) -> Key:
         sums = [
-            Fraction(0) if s is None else _amount(_plain(c[place]), s.denominator)
+            0 if s is None else _plain(c[place])
             for s, c in zip(self.scales, block.least, strict=True)
         ]
-        error = error_key(float(block.total[place]))
-        first = error if self.problem.objective == "error" else self._of_objective(sums)
-        return (first, error, sums[0], sums[1], sums[2], (*block.node.places, place))
+        return self._ordered(float(block.total[place]), sums, (*block.node.places, place))
 
-    def _of_objective(self, sums: list[Amount]) -> Amount:
-        return sums[self.main]
+    def _ordered(self, error_m: float, sums: list[Whole], places: tuple[int, ...]) -> Key:
+        """The order of `evaluate.rank`; a resource in which no two designs differ counts as 0."""
+        error = error_key(error_m)
+        first = error if self.problem.objective == "error" else sums[self.main]
+        return (first, error, sums[0], sums[1], sums[2], places)
 
     def _push_design(self, heap: list[Entry], node: _Node) -> None:
         options = tuple(int(self.tables.order[r][place]) for r, place in enumerate(node.places))
@@ -302,8 +307,8 @@ class BestFirstSearch:
         found = evaluate(self.problem, design)
         if broken(self.problem, found):
             return
-        ranked = rank(self.problem, design, found)
-        key: Key = (*ranked[:5], (*node.places, *node.clocks))
+        sums = [0 if s is None else s.whole(found.amount(s.name)) for s in self.scales]
+        key = self._ordered(found.error_m, sums, (*node.places, *node.clocks))
         heapq.heappush(heap, (key, next(self.counter), None, 0, design))
 
 
@@ -314,13 +319,9 @@ def _least_within(suffix: tuple[Floats, Column], slack: Floats) -> tuple[Bools, 
     return place >= 0, amounts[np.maximum(place, 0)]
 
 
-def _plain(whole: Any) -> int | float:
+def _plain(whole: Any) -> Whole:
     """An element of a column as a number of Python's own."""
     return math.inf if whole == math.inf else int(whole)
-
-
-def _amount(whole: int | float, denominator: int) -> Amount:
-    return whole if isinstance(whole, float) else Fraction(whole, denominator)
 
 
 def _by_id(vehicle: VehicleTable) -> list[int]:

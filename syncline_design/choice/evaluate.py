@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 
 from syncline_design.choice.option import Option, ResourceName, Resources
@@ -87,6 +88,8 @@ def _tightest(
     least lies at an end of every stage's distances, or where a sensor's noise by range bends.
     """
     rate = problem.sync_rate()
+    if not problem.nearer:
+        return sensor_error, rate
     ends = []
     for moves in itertools.product(*(_places(problem, options, one) for one in problem.nearer)):
         less = sum((error for error, _ in moves), Fraction(0))
@@ -130,8 +133,7 @@ def _errors(
             (pair.rate() * bound for pair, bound in zip(problem.pairs, bounds, strict=True)),
             Fraction(0),
         )
-    sensor_error = sum((option.error() for option in options), Fraction(0))
-    return sensor_error, tau_sys, sync_error
+    return added_up([option.error() for option in options]), tau_sys, sync_error
 
 
 def total_error_m(problem: Problem, design: Design) -> float:
@@ -143,7 +145,7 @@ def total_error_m(problem: Problem, design: Design) -> float:
 
 def _systematic(problem: Problem, options: list[Option]) -> Fraction:
     """Known systematic errors [m]: those of every design and those of its sensors."""
-    return sum((option.systematic() for option in options), problem.fixed_error())
+    return added_up([problem.fixed_error(), *(option.systematic() for option in options)])
 
 
 def chosen_options(problem: Problem, design: Design) -> list[Option]:
@@ -200,13 +202,20 @@ def _sum(
     parts: list[tuple[Resources, int]] = [(option.resources, 1) for option in options]
     parts += [(clock.resources, 1) for clock in chosen_clocks(problem, design)]
     parts += [(problem.infrastructure[u.infrastructure].resources, u.count) for u in units]
-    total = Fraction(0)
+    amounts = []
     for resources, count in parts:
         amount = resources.of(name)
         if amount is None:
             return None
-        total += count * amount
-    return total
+        amounts.append(amount if count == 1 else count * amount)
+    return added_up(amounts)
+
+
+def added_up(terms: Sequence[Fraction]) -> Fraction:
+    """Their sum, over the least common denominator and so reduced only once."""
+    pairs = [term.as_integer_ratio() for term in terms]
+    unit = math.lcm(*(bottom for _, bottom in pairs))
+    return Fraction(sum(top * (unit // bottom) for top, bottom in pairs), unit)
 
 
 def broken(problem: Problem, found: Evaluation, *, accuracy: bool = True) -> tuple[str, ...]:
