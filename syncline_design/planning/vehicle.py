@@ -214,7 +214,7 @@ def _demand_sight(case: Case, stage: StageCase, found: Vehicle) -> None:
         f"stages.{stage.index}.platform.height",
         f"the platform of stage {stage.choice.name!r} keeps {to_digits(float(height), 4)} m over "
         f"its targets, and they are at most {to_digits(most, 4)} m away",
-        f"a height of at most {100 * FAR:.0f} % of its distance, {to_digits(most, 4)} m",
+        f"a height of at most {to_digits(100 * FAR, 2)} % of its distance, {to_digits(most, 4)} m",
         hint="state the distance at which the sensor is used, or the height at which it is flown",
     )
     raise BadInput((flaw,))
