@@ -12,10 +12,10 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.optimize import minimize, rosen, rosen_der, rosen_hess
 
+from fitted_data import data_from
 from syncline_design.diagnosis.box_newton import CostHere, least, least_in_box
-from syncline_design.diagnosis.candidates import candidates, directed_parts
-from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.fitting import Data, data_of, fit
+from syncline_design.diagnosis.candidates import candidates
+from syncline_design.diagnosis.fitting import fit
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
     Structure,
@@ -28,11 +28,8 @@ from syncline_design.diagnosis.noise import (
     white_covariance,
 )
 from syncline_design.diagnosis.noise_fit import Packing, fit_noise
-from syncline_design.diagnosis.scene import scene
-from syncline_design.diagnosis.system import measured
 from syncline_design.machine.linear_algebra import one_thread
-from syncline_design.spec.load import load
-from tests.world import WorldLog, hidden, make_log, scenario
+from tests.world import hidden, make_log, scenario
 
 LATE = hidden("latency", "position", latency_s=0.05)
 
@@ -41,14 +38,6 @@ LATE = hidden("latency", "position", latency_s=0.05)
 def _one_thread() -> Iterator[None]:
     with one_thread():
         yield
-
-
-def data_from(log: WorldLog, folder: Path) -> Data:
-    spec = folder / "spec.yaml"
-    spec.write_text(log.spec_yaml(), encoding="utf-8")
-    inputs = measured(load(spec), [log.to_csv(folder / "log.csv")])
-    view = scene(inputs.system, inputs.log, inputs.known)
-    return data_of(view, structure_of(view, directed_parts(view, candidates(view))))
 
 
 def test_a_quadratic_in_a_box_is_least_where_all_active_sets_say() -> None:

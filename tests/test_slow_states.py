@@ -13,20 +13,17 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from diagnosis_samples import LATENCY
+from fitted_data import data_from
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
-from syncline_design.diagnosis.candidates import candidates, directed_parts, signatures
-from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.fitting import Data, data_of, fit
+from syncline_design.diagnosis.candidates import candidates, signatures
+from syncline_design.diagnosis.fitting import Data, fit
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.noise import as_specified, first_guess, precision, spec_bounds
 from syncline_design.diagnosis.noise_fit import Packing, mean_share, mean_share_slope
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.run import outcome
-from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.slow_states import slow_states
-from syncline_design.diagnosis.system import measured
 from syncline_design.machine.linear_algebra import one_thread
-from syncline_design.spec.load import load
 from tests.world import WorldLog, hidden, make_log, scenario
 from tests.world.foreign import KINDS, WHITE, foreign
 
@@ -39,14 +36,6 @@ def _one_thread() -> Iterator[None]:
     """The matrices are small, as for `diagnose`."""
     with one_thread():
         yield
-
-
-def data_from(log: WorldLog, folder: Path) -> Data:
-    spec = folder / "spec.yaml"
-    spec.write_text(log.spec_yaml(), encoding="utf-8")
-    inputs = measured(load(spec), [log.to_csv(folder / "log.csv")])
-    view = scene(inputs.system, inputs.log, inputs.known)
-    return data_of(view, structure_of(view, directed_parts(view, candidates(view))))
 
 
 @pytest.mark.parametrize("time_constant_s", [0.02, 3.0, 40.0, 2e6])

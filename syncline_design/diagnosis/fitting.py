@@ -167,9 +167,9 @@ def fit(
     fitted = _fitted_noise(data, scatter, starts, bounds, sizes, nll - against)
     known = precision(data.structure, fitted)
     after = stepped(data, found.acting, known, found.error, columns=found.columns)
-    if not (bounds.hold(level, sizes) and nll < known.likelihood_of(after.squares)):
-        level, factored, found = fitted, known, after
-    nll = factored.likelihood_of(found.squares)
+    nll_after = known.likelihood_of(after.squares)
+    if not (bounds.hold(level, sizes) and nll < nll_after):
+        level, factored, found, nll = fitted, known, after, nll_after
     return Model(
         found.acting, tuple(opened), bounds, level, nll, found.covariance, found.error, factored
     )

@@ -93,9 +93,10 @@ def competed(
             if a.cosine > (like if a.acts_always else NEAR) or a.fit < RIVAL_NATS]  # fmt: skip
     near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]
     rest = without(model, label)
+    rivals = [a.candidate.label for a in near]
     fits = {
-        label: with_effect(data, rest, found[label], rest.level, against=model.nll)
-        for label in (a.candidate.label for a in near)
+        rival: with_effect(data, rest, found[rival], rest.level, against=model.nll)
+        for rival in rivals
     }
     charges = {one: charge(data, fitted, one, model) for one, fitted in fits.items()}
     charges[label] = charge(data, model, label, model)

@@ -273,6 +273,16 @@ def provenance(pairs: Sequence[tuple[str, str]], reach: Audience = "page") -> li
     return section("provenance", "Provenance", [record] if pairs else [], reach=reach)
 
 
+def pins(version: str, spec_sha256: str, catalogs_sha256: str, seed: int) -> list[tuple[str, str]]:
+    """What a result of a spec is pinned by, for `provenance`."""
+    return [
+        ("syncline-design", version),
+        ("Spec, SHA-256", spec_sha256),
+        ("Catalogs, SHA-256", catalogs_sha256),
+        ("Seed", str(seed)),
+    ]
+
+
 def for_output(document: Document, output: Literal["page", "text"]) -> Document:
     """The document as far as it reaches into one kind of output; empty sections are left out."""
     kept = []

@@ -20,6 +20,7 @@ from syncline_design.report.document import (
     code,
     given,
     muted,
+    pins,
     provenance,
     section,
     show,
@@ -103,13 +104,11 @@ def on_audit(result: Audit) -> Document:
 
 def _provenance(result: Audit) -> list[tuple[str, str]]:
     """What the figures are pinned by; those in metres by a spec besides."""
-    version, spec = ("syncline-design", result.version), result.spec
+    spec = result.spec
     if spec is None:
-        return [version]
-    return [
-        ("Spec file", spec.file), version, ("Spec, SHA-256", spec.spec_sha256),
-        ("Catalogs, SHA-256", spec.catalogs_sha256), ("Seed", str(spec.seed)),
-    ]  # fmt: skip
+        return [("syncline-design", result.version)]
+    own = pins(result.version, spec.spec_sha256, spec.catalogs_sha256, spec.seed)
+    return [("Spec file", spec.file), *own]
 
 
 def _name(result: Audit) -> str:

@@ -24,6 +24,7 @@ from syncline_design.report.document import (
     Outcome,
     Text,
     code,
+    pins,
     provenance,
     section,
     show,
@@ -377,8 +378,5 @@ def _rests(found: Plan) -> list[Node]:
 
 def _provenance(found: Plan) -> list[tuple[str, str]]:
     known = found.provenance
-    return [
-        ("Spec file", found.spec.file), ("syncline-design", known.version),
-        ("Spec, SHA-256", known.spec_sha256), ("Catalogs, SHA-256", known.catalogs_sha256),
-        ("Seed", str(known.seed)),
-    ]  # fmt: skip
+    own = pins(known.version, known.spec_sha256, known.catalogs_sha256, known.seed)
+    return [("Spec file", found.spec.file), *own]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
-from syncline_design.report.document import Inline, Items, Node, Outcome, code, given
+from syncline_design.report.document import Inline, Items, Node, Outcome, code, given, pins
 from syncline_design.report.text import visible
 from syncline_design.report.words import (
     AXES,
@@ -220,10 +220,7 @@ def selection_reason(verdict: Verdict, stage: str, role: str) -> str:
 def pinned_by(found: Provenance) -> list[tuple[str, str]]:
     """What a verdict's figures are pinned by, for the last lines of a report."""
     return [
-        ("syncline-design", found.version),
-        ("Spec, SHA-256", found.spec_sha256),
-        ("Catalogs, SHA-256", found.catalogs_sha256),
-        ("Seed", str(found.seed)),
+        *pins(found.version, found.spec_sha256, found.catalogs_sha256, found.seed),
         ("Python", found.python),
         ("NumPy", found.numpy),
     ]
