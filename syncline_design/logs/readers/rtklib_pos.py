@@ -22,8 +22,15 @@ from syncline_design.logs.readers.decimal_stamps import nanoseconds
 from syncline_design.logs.readers.epochs import DAY_NS, NANO, WEEK_NS, held, week_start_ns
 from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import Frame, Recording, Timeline
-from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
-from syncline_design.logs.refusals import refuse
+from syncline_design.logs.readers.text_lines import (
+    BadLineError,
+    Damage,
+    Line,
+    demand_text,
+    head_lines,
+    line_blocks,
+    usual_width,
+)
 from syncline_design.machine.quick_dataclass import dataclass
 
 DATE = re.compile(r"^(\d{4})/(\d\d?)/(\d\d?)$")
@@ -39,6 +46,7 @@ BEHIND = (
     *("velocity_north_mps", "velocity_east_mps", "velocity_up_mps"),
 )
 TITLES = re.compile(r"latitude|x-ecef|e-baseline")
+Epoch = tuple[int, list[float], list[float]]  # time [ns], place, the rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +58,7 @@ class PosHeader:
     sea_level: bool = False
     velocity: bool = False
     reference: str = ""
+    fields: int = 0  # in a line below it; 0 where it names none
 
 
 def header_of(lines: Sequence[str]) -> PosHeader:
@@ -72,7 +81,19 @@ def header_of(lines: Sequence[str]) -> PosHeader:
         "/geodetic" in whole,
         "vn(m/s)" in title,
         reference[1].strip() if reference else "",
+        _fields_named(title, place),
     )
+
+
+def _fields_named(title: str, place: str) -> int:
+    """Fields of an epoch by the line of names: its time has two, an angle in minutes three."""
+    names = fields_of(title.lstrip("% "))
+    return len(names) + 1 + 4 * (place == "dms") if len(names) >= LEAST_FIELDS - 1 else 0
+
+
+def fields_of(text: str) -> list[str]:
+    """The fields of a line, separated by blanks, commas or semicolons."""
+    return text.replace(",", " ").replace(";", " ").split()
 
 
 class PosRecording(BatchRecording):
@@ -83,45 +104,71 @@ class PosRecording(BatchRecording):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         with path.open("rb") as file:
-            self._header = header_of(head_lines(file.read(1 << 16)))
+            head = head_lines(file.read(1 << 16))
+        self._header = header_of(head)
         self._name = path.stem
-        self._fields = 0
+        self._fields = usual_width(self._widths(head), self._header.fields)
+
+    def _widths(self, head: Sequence[str]) -> list[int]:
+        """How many fields each of the first epochs has."""
+        widths = []
+        for line in head:
+            fields = fields_of(line)
+            if not line.startswith("%") and self._is_epoch(fields):
+                widths.append(len(fields))
+        return widths
+
+    def _is_epoch(self, fields: Sequence[str]) -> bool:
+        try:
+            self._epoch(fields)
+        except BadLineError:
+            return False
+        return True
 
     def _batches(self, wanted: str | None) -> Iterator[Batch]:
-        rows = 0
+        rows, damage = 0, Damage()
         for block in line_blocks(self.path):
-            stamps: list[int] = []
-            places: list[list[float]] = []
-            others: list[list[float]] = []
-            for line in block:
-                if line.text.startswith("%"):
-                    continue
-                read = self._row(line)
-                if read is None:
-                    self._cut(f"the last line is cut: {line.text[:40]!r}", rows + len(stamps))
-                    continue
-                stamps.append(read[0])
-                places.append(read[1])
-                others.append(read[2])
-            if stamps:
-                rows += len(stamps)
-                columns = self._columns(np.array(places), others)
-                yield Batch(self._name, len(stamps), np.array(stamps, np.int64), None, columns)
+            read = list(self._epochs(block, damage))
+            if read:
+                rows += len(read)
+                columns = self._columns(np.array([r[1] for r in read]), [r[2] for r in read])
+                stamps = np.array([r[0] for r in read], np.int64)
+                yield Batch(self._name, len(read), stamps, None, columns)
         if not rows:
-            raise refuse(self.path, "no epoch in the solution", expected="lines below the header")
+            raise damage.refusal(self.path, "no epoch in the solution", "lines below the header")
+        if damage.said():
+            self._cut(damage.said(), rows)
 
-    def _row(self, line: Line) -> tuple[int, list[float], list[float]] | None:
-        """Time, place and the rest of an epoch; None for a last line that is cut."""
-        fields = line.text.replace(",", " ").replace(";", " ").split()
-        size = 7 if self._header.place == "dms" else 3
-        if not self._fields:
-            self._fields = len(fields)
-        if len(fields) != self._fields or len(fields) < LEAST_FIELDS + size - 3:
-            if not line.whole and len(fields) < self._fields:
-                return None
+    def _epochs(self, block: Sequence[Line], damage: Damage) -> Iterator[Epoch]:
+        """Those of a block; what is none goes to the damage."""
+        for line in block:
+            if line.text.startswith("%"):
+                continue
+            fields = fields_of(line.text)
+            if not line.whole and len(fields) < (self._fields or self._header.fields):
+                damage.cut = line.text
+                continue
+            try:
+                demand_text(line)
+                self._demand_width(fields)
+                yield self._epoch(fields)
+            except BadLineError as error:
+                damage.add(line, error)
+
+    def _demand_width(self, fields: Sequence[str]) -> None:
+        """As many fields as most epochs have; where none was seen yet, as the first has."""
+        if self._fields and len(fields) != self._fields:
             message = f"an epoch of {len(fields)} fields among those of {self._fields}"
-            raise bad_line(self.path, line, message, f"{self._fields} fields in every line")
+            raise BadLineError(message, f"{self._fields} fields in every line")
+        if not self._fields and self._is_epoch(fields):
+            self._fields = len(fields)
+
+    def _epoch(self, fields: Sequence[str]) -> Epoch:
+        """Time, place and the rest of a line; BadLineError where it is none."""
+        size = 7 if self._header.place == "dms" else 3
         try:
+            if len(fields) < LEAST_FIELDS + size - 3:
+                raise ValueError
             stamp = self._stamp(fields[0], fields[1])
             place = [float(cell) for cell in fields[2 : 2 + size]]
             rest = [float(cell) for cell in fields[2 + size : 2 + size + len(BEHIND)]]
@@ -129,11 +176,11 @@ class PosRecording(BatchRecording):
             expected = (
                 "time, place, quality, satellites, as in 2026/03/01 12:00:00.000 47.1 8.5 ..."
             )
-            raise bad_line(self.path, line, "no epoch of a solution", expected) from None
+            raise BadLineError("no epoch of a solution", expected) from None
         if size == 7:
             place = _from_dms(fields[2:9])
         if not self._possible(place):
-            raise bad_line(self.path, line, "no place on earth", "latitude, longitude, height")
+            raise BadLineError("no place on earth", "latitude, longitude, height")
         return stamp, place, rest
 
     def _stamp(self, day: str, clock: str) -> int:
@@ -223,16 +270,19 @@ def _recognises(head: FileHead) -> int:
     lines = head_lines(head.start)
     if not lines:
         return NO
-    if lines[0].startswith("%") and any(TITLES.search(x) for x in lines if x.startswith("%")):
+    if any(line.startswith("%") and TITLES.search(line) for line in lines):
         return BY_MAGIC
-    first = next((line for line in lines if not line.startswith("%")), "")
-    fields = first.replace(",", " ").split()
+    rows = [line for line in lines if not line.startswith("%")]
+    return BY_SHAPE if 2 * sum(map(_is_like_an_epoch, rows)) > len(rows) else NO
+
+
+def _is_like_an_epoch(line: str) -> bool:
+    fields = line.replace(",", " ").split()
     if len(fields) < LEAST_FIELDS or not fields[5].isdecimal() or not fields[6].isdecimal():
-        return NO
+        return False
     dated = DATE.match(fields[0]) is not None and CLOCK.match(fields[1]) is not None
     weekly = fields[0].isdecimal() and len(fields[0]) <= 4 and len(fields) >= 13
-    weekly = weekly and all("." in cell for cell in fields[1:5])
-    return BY_SHAPE if dated or weekly else NO
+    return dated or (weekly and all("." in cell for cell in fields[1:5]))
 
 
 def _open(path: Path) -> Recording:

@@ -21,7 +21,15 @@ from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFa
 from syncline_design.logs.readers.decimal_stamps import nanoseconds
 from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import UNSET, Recording, Timeline
-from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
+from syncline_design.logs.readers.text_lines import (
+    BadLineError,
+    Damage,
+    Line,
+    demand_text,
+    head_lines,
+    line_blocks,
+    usual_width,
+)
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.quick_dataclass import dataclass
@@ -77,19 +85,19 @@ def layout_of(lines: Sequence[str]) -> tuple[Layout, int] | None:
     """The layout of a trajectory and how sure it is; None where it is none."""
     comments = [line.lstrip("# \t") for line in lines if line.lstrip().startswith("#")]
     rows = [cells_of(line) for line in lines if not line.lstrip().startswith("#")][:50]
-    widths = [len(row) for row in rows]
-    width = max(set(widths), key=widths.count, default=0)
-    if not rows or 4 * widths.count(width) < 3 * len(rows):  # some bad rows are refused later
+    width = usual_width([len(row) for row in rows])
+    if 2 * sum(len(row) == width for row in rows) <= len(rows):  # some damaged rows are left out
         return None
     head = next((found for c in comments if (found := _euroc_head(c, width)) is not None), None)
     if head is not None:
         return head, BY_MAGIC
     known = [values for row in rows if len(row) == width and (values := _figures(row)) is not None]
-    if 4 * len(known) < 3 * len(rows):
+    if 2 * len(known) <= len(rows):
         return None
     figures = np.array(known)
-    commas = any("," in line for line in lines if not line.lstrip().startswith("#"))
-    if commas and width in BARE_EUROC and figures[0, 0] >= EUROC_LEAST:
+    bare = [line for line in lines if not line.lstrip().startswith("#")]
+    commas = 2 * sum("," in line for line in bare) > len(bare)
+    if commas and width in BARE_EUROC and np.median(figures[:, 0]) >= EUROC_LEAST:
         return _euroc_by_width(figures, width)
     if width == 12 and not commas and _are_rotations(figures):
         return KITTI, BY_SHAPE
@@ -158,12 +166,19 @@ def _sizes(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     return sizes
 
 
-def _are_rotations(rows: NDArray[np.float64]) -> bool:
-    turn = np.clip(rows.reshape(-1, 3, 4)[:, :, :3], -1e9, 1e9)
+def _rotations(matrices: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which of some 3 x 3 matrices turn, and neither mirror nor stretch."""
+    turn = np.clip(matrices, -1e9, 1e9)
     product = turn @ np.swapaxes(turn, 1, 2)
-    return bool(
-        np.all(np.abs(product - np.eye(3)) < LENGTH_SLACK) and np.all(np.linalg.det(turn) > 0)
-    )
+    even = np.all(np.abs(product - np.eye(3)) < LENGTH_SLACK, axis=(1, 2))
+    turns: NDArray[np.bool_] = even & (np.linalg.det(turn) > 0)
+    return turns
+
+
+def _are_rotations(rows: NDArray[np.float64]) -> bool:
+    """Whether rows are the upper ones of pose matrices; a few may be damaged."""
+    good = _rotations(rows.reshape(-1, 3, 4)[:, :, :3])
+    return bool(4 * np.count_nonzero(good) >= 3 * good.shape[0])
 
 
 def quaternions_of(turn: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -214,51 +229,52 @@ class TrajectoryRecording(BatchRecording):
         self._timeline: tuple[Timeline, tuple[str, ...]] = ("unknown", ())
 
     def _batches(self, wanted: str | None) -> Iterator[Batch]:
-        rows, zeros, first = 0, 0, None
+        rows, zeros, first, damage = 0, 0, None, Damage()
         timed = self._layout.kind != "KITTI"
         for block in line_blocks(self.path):
-            stamps, figures = self._read(block, rows)
-            if not figures:
+            read = list(self._rows(block, damage))
+            if not read:
                 continue
-            rows += len(figures)
-            table = np.array(figures)
-            columns = self._columns(table)
+            rows += len(read)
+            columns = self._columns(np.array([figures for _, figures in read]))
             zeros += int(np.count_nonzero(np.isnan(columns.get("quaternion_w", np.zeros(0)))))
-            primary = np.array(stamps, dtype=np.int64) if timed else None
+            primary = np.array([stamp for stamp, _ in read], dtype=np.int64) if timed else None
             first = primary if first is None else first
-            yield Batch(self.path.stem, len(figures), primary, None, columns)
+            yield Batch(self.path.stem, len(read), primary, None, columns)
         if not rows:
-            raise refuse(self.path, "no row in the trajectory")
+            raise damage.refusal(self.path, "no row in the trajectory", "rows of figures")
         self._zeros = zeros
         if first is not None:
             self._timeline = timeline_of(first, "utc")
+        if damage.said():
+            self._cut(damage.said(), rows)
 
-    def _read(self, block: Sequence[Line], before: int) -> tuple[list[int], list[list[float]]]:
-        stamps: list[int] = []
-        figures: list[list[float]] = []
-        timed = self._layout.kind != "KITTI"
+    def _rows(self, block: Sequence[Line], damage: Damage) -> Iterator[tuple[int, list[float]]]:
+        """Time and figures of the rows of a block; what is none goes to the damage."""
         for line in block:
             if line.text.lstrip().startswith("#"):
                 continue
             cells = cells_of(line.text)
-            if len(cells) < self._layout.cells and not line.whole:
-                self._cut(f"the last row is cut: {line.text[:40]!r}", before + len(figures))
+            if not line.whole and len(cells) < self._layout.cells:
+                damage.cut = line.text
                 continue
-            if len(cells) != self._layout.cells:
-                raise bad_line(
-                    self.path,
-                    line,
-                    f"a row of {len(cells)} cells in a trajectory of {self._layout.kind} layout",
-                    f"{self._layout.cells} cells",
-                )
             try:
-                values = [float(cell) for cell in cells[timed:]]
-                stamp = self._stamp(cells[0]) if timed else UNSET
-            except ValueError:
-                raise bad_line(self.path, line, "text among numbers", "numbers only") from None
-            stamps.append(stamp)
-            figures.append(values)
-        return stamps, figures
+                demand_text(line)
+                yield self._row(cells)
+            except BadLineError as error:
+                damage.add(line, error)
+
+    def _row(self, cells: Sequence[str]) -> tuple[int, list[float]]:
+        kind, width = self._layout.kind, self._layout.cells
+        if len(cells) != width:
+            message = f"a row of {len(cells)} cells in a trajectory of {kind} layout"
+            raise BadLineError(message, f"{width} cells")
+        timed = kind != "KITTI"
+        try:
+            figures = [float(cell) for cell in cells[timed:]]
+            return self._stamp(cells[0]) if timed else UNSET, figures
+        except ValueError:
+            raise BadLineError("text among numbers", "numbers only") from None
 
     def _stamp(self, text: str) -> int:
         return nanoseconds(text, "ns" if self._layout.kind == "EuRoC" else "s")
@@ -266,7 +282,8 @@ class TrajectoryRecording(BatchRecording):
     def _columns(self, table: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
         if self._layout.kind == "KITTI":
             poses = table.reshape(-1, 3, 4)
-            q = quaternions_of(poses[:, :, :3])
+            turn = np.clip(poses[:, :, :3], -1e9, 1e9)
+            q = np.where(_rotations(turn)[:, None], quaternions_of(turn), np.nan)
             columns = {name: poses[:, k, 3] for k, name in enumerate(PLACE)}
             return columns | {name: q[:, k] for k, name in enumerate(WXYZ)}
         columns = {name: table[:, k] for k, name in enumerate(self._layout.columns) if name}
@@ -293,13 +310,15 @@ class TrajectoryRecording(BatchRecording):
             order = "".join(n[-1] for n in self._layout.columns if n.startswith("quaternion"))
             notes.append(f"quaternions were read in the order {order}")
         timeline, of_times = self._timeline
-        if self._layout.kind == "KITTI":
+        kitti = self._layout.kind == "KITTI"
+        if kitti:
             notes += ["the layout has no times: they are in another file, times.txt"]
             notes += ["pose matrices were made quaternions"]
         elif timeline == "utc":
             of_times = (*of_times, "stamps were taken to count from 1970-01-01 UTC")
         if self._zeros:
-            notes.append(f"{self._zeros} quaternions without length were left out")
+            what = "matrices that do not turn" if kitti else "quaternions without length"
+            notes.append(f"{self._zeros} {what} were left out")
         return StreamFacts(
             quantity=tuple(what for what, names in said if set(names) <= columns),
             timeline=timeline,

@@ -1,0 +1,175 @@
+"""Damaged lines of text formats: they cost themselves, are counted and said, and no other line.
+
+Every file is made here, line by line, so that what has to be read is known: all lines but those
+that the damage touches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.logs.readers import open_recording
+from syncline_design.logs.readers.stream import Recording
+from syncline_design.spec.load import BadInput
+
+SECOND = 10**9
+COUNT = 40
+TITLE = (
+    "%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   "
+    "sdu(m)  sdne(m)  sdeu(m)  sdun(m) age(s)  ratio"
+)
+DEVIATIONS = "1  19   0.0045   0.0046   0.0097   0.0027   0.0011  -0.0030   0.03    5.9"
+ORIGIN = 1_688_990_400  # 2023-07-10 12:00 as a calendar reads it
+
+
+def solution(k: int) -> str:
+    return f"2023/07/10 12:00:{k:02d}.250   35.{k:04d}   136.8814   41.4   {DEVIATIONS}"
+
+
+def tum(k: int) -> str:
+    return f"{ORIGIN + k}.250 {k} 2.5 3.5 0 0 0.6 0.8"
+
+
+def euroc(k: int) -> str:
+    return f"{(ORIGIN + k) * SECOND + 250_000_000},{k},2.5,3.5,0.8,0,0,0.6"
+
+
+def kitti(k: int) -> str:
+    return f"1 0 0 {k} 0 1 0 2.5 0 0 1 3.5"
+
+
+# head, row, and how many fields most rows have, as people are told
+FORMATS: dict[str, tuple[list[str], Callable[[int], str]]] = {
+    "solution": (["% program : RTKPOST", TITLE], solution),
+    "solution without header": ([], solution),
+    "TUM": ([], tum),
+    "EuRoC": ([], euroc),
+    "KITTI": ([], kitti),
+}
+
+
+def lines(name: str) -> list[bytes]:
+    head, row = FORMATS[name]
+    return [line.encode() for line in (*head, *(row(k) for k in range(COUNT)))]
+
+
+def cut_and_joined(rows: list[bytes], at: int) -> set[int]:
+    """The end of a row was never written: the next one begins in the midst of it."""
+    if at + 1 < len(rows):
+        rows[at : at + 2] = [rows[at][: len(rows[at]) // 2] + rows[at + 1], b""]
+        return {at, at + 1}
+    rows[at] = rows[at][: len(rows[at]) // 2]
+    return {at}
+
+
+def zeros(rows: list[bytes], at: int) -> set[int]:
+    """What a power cut leaves: a block of NUL from the midst of a row on."""
+    rows[at] = rows[at][:9] + bytes(4096) + rows[at][20:]
+    return {at}
+
+
+def half_twice(rows: list[bytes], at: int) -> set[int]:
+    """The first half of a row, and then the whole of it."""
+    rows[at] = rows[at][: len(rows[at]) // 2] + b"\n" + rows[at]
+    return set()
+
+
+def a_word(rows: list[bytes], at: int) -> set[int]:
+    rows[at] = rows[at].replace(b"2", b"z")
+    return {at}
+
+
+def endless(rows: list[bytes], at: int) -> set[int]:
+    """A line of 2 MB; where nothing else begins a file, it has no format to be told by."""
+    at = max(at, 1)
+    rows[at] = rows[at] + b" 1" * 10**6
+    return {at}
+
+
+DAMAGES = (cut_and_joined, zeros, half_twice, a_word, endless)
+
+
+def written(path: Path, rows: Sequence[bytes], end: bytes = b"\n") -> Recording:
+    path.write_bytes(b"".join(row + end for row in rows))
+    return open_recording(path)
+
+
+def told(recording: Recording) -> list[int]:
+    """Which of the rows was read, by the figures that count them."""
+    (stream,) = recording.streams()
+    found: list[int] = []
+    for piece in recording.samples(stream.name):
+        latitude = piece.columns.get("latitude_deg")
+        if latitude is not None:
+            found += np.rint((latitude - 35) * 1e4).astype(int).tolist()
+        else:
+            found += piece.columns["position_x_m"].astype(int).tolist()
+    if stream.stamps is not None:
+        wanted = [(ORIGIN + k) * SECOND + 250_000_000 for k in found]
+        assert stream.stamps.primary_ns.tolist() == wanted
+    return found
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("place", ["first", "middle", "last"])
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_damaged_line_costs_itself(
+    tmp_path: Path, name: str, place: str, damage: Callable[[list[bytes], int], set[int]]
+) -> None:
+    rows = lines(name)
+    head = len(rows) - COUNT
+    at = {"first": 0, "middle": 17, "last": COUNT - 1}[place]
+    lost = {k - head for k in damage(rows, head + at)}
+    at = min(lost, default=at)
+    recording = written(tmp_path / "run.txt", rows)
+    assert told(recording) == [k for k in range(COUNT) if k not in lost]
+    assert recording.incomplete is not None
+    assert recording.incomplete.reason.startswith("1 damaged line was left out")
+    assert f"line {head + at + 1}: " in recording.incomplete.reason
+    assert recording.incomplete.messages == COUNT - len(lost)
+    assert all(stream.partial for stream in recording.streams())
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_many_damaged_lines_are_counted(tmp_path: Path, name: str) -> None:
+    rows = lines(name)
+    head = len(rows) - COUNT
+    for k in range(3, COUNT, 5):
+        rows[head + k] = rows[head + k][:11]
+    recording = written(tmp_path / "run.txt", rows)
+    assert told(recording) == [k for k in range(COUNT) if k % 5 != 3]
+    assert recording.incomplete is not None
+    assert recording.incomplete.reason.startswith("8 damaged lines were left out, the first of")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_ends_of_lines_may_be_mixed(tmp_path: Path, name: str) -> None:
+    rows = [row + b"\r" * (k % 3 == 0) for k, row in enumerate(lines(name))]
+    recording = written(tmp_path / "run.txt", [b"", *rows, b"", b"  "])
+    assert told(recording) == list(range(COUNT))
+    assert recording.incomplete is None
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_where_no_line_is_good_the_file_is_refused(tmp_path: Path, name: str) -> None:
+    rows = lines(name)
+    rows[-COUNT:] = [row[:11] for row in rows[-COUNT:]]
+    with pytest.raises(BadInput):
+        written(tmp_path / "run.txt", rows).streams()
+    with pytest.raises(BadInput):
+        written(tmp_path / "empty.txt", []).streams()
+    with pytest.raises(BadInput):
+        written(tmp_path / "head.txt", rows[:-COUNT]).streams()
+
+
+def test_a_header_settles_how_many_fields_where_rows_disagree(tmp_path: Path) -> None:
+    """Two rows, one of them cut: the names above tell which."""
+    short = solution(0)[: solution(0).rindex("-")]
+    recording = written(tmp_path / "run.pos", [row.encode() for row in (TITLE, short, solution(1))])
+    assert told(recording) == [1]
+    recording = written(tmp_path / "run.pos", [row.encode() for row in (TITLE, solution(0), short)])
+    assert told(recording) == [0]
