@@ -150,7 +150,10 @@ def _add(score: Score, recording: MadeRecording, one: Made, row: StreamAudit) ->
         if names:
             score.misses.append(f"{one.name} (sound): {sorted(names)}")
     if one.bound_s and row.residual_s.bound is not None:
-        score.bounds.append(row.residual_s.bound / one.bound_s)
+        ratio = row.residual_s.bound / one.bound_s
+        score.bounds.append(ratio)
+        if abs(ratio - 1.0) > 0.1:
+            score.misses.append(f"{one.name}: bound {ratio:.2f} of the planted one")
 
 
 # ---- peers ----------------------------------------------------------------------------------

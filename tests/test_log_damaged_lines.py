@@ -42,13 +42,22 @@ def kitti(k: int) -> str:
     return f"1 0 0 {k} 0 1 0 2.5 0 0 1 3.5"
 
 
-# head, row, and how many fields most rows have, as people are told
+def table(k: int) -> str:
+    return f"{ORIGIN + k}.250,35.{k:04d},136.8814,41.4"
+
+
+def dated(k: int) -> str:
+    return f"2023-07-10T12:00:{k:02d}.250Z;35,{k:04d};136,8814;41,4"
+
+
 FORMATS: dict[str, tuple[list[str], Callable[[int], str]]] = {
     "solution": (["% program : RTKPOST", TITLE], solution),
     "solution without header": ([], solution),
     "TUM": ([], tum),
     "EuRoC": ([], euroc),
     "KITTI": ([], kitti),
+    "CSV": (["time_s,latitude_deg,longitude_deg,height_m"], table),
+    "CSV of dates": (["time;latitude_deg;longitude_deg;height_m"], dated),
 }
 
 
@@ -79,7 +88,7 @@ def half_twice(rows: list[bytes], at: int) -> set[int]:
 
 
 def a_word(rows: list[bytes], at: int) -> set[int]:
-    rows[at] = rows[at].replace(b"2", b"z")
+    rows[at] = rows[at].replace(b"2", b"z").replace(b"168", b"z")
     return {at}
 
 
@@ -122,6 +131,8 @@ def test_a_damaged_line_costs_itself(
 ) -> None:
     rows = lines(name)
     head = len(rows) - COUNT
+    if damage is endless and name.startswith("CSV"):
+        pytest.skip("a cell, which only samples look at")
     at = {"first": 0, "middle": 17, "last": COUNT - 1}[place]
     lost = {k - head for k in damage(rows, head + at)}
     at = min(lost, default=at)
@@ -138,12 +149,12 @@ def test_a_damaged_line_costs_itself(
 def test_many_damaged_lines_are_counted(tmp_path: Path, name: str) -> None:
     rows = lines(name)
     head = len(rows) - COUNT
-    for k in range(3, COUNT, 5):
+    for k in range(3, COUNT, 10):
         rows[head + k] = rows[head + k][:11]
     recording = written(tmp_path / "run.txt", rows)
-    assert told(recording) == [k for k in range(COUNT) if k % 5 != 3]
+    assert told(recording) == [k for k in range(COUNT) if k % 10 != 3]
     assert recording.incomplete is not None
-    assert recording.incomplete.reason.startswith("8 damaged lines were left out, the first of")
+    assert recording.incomplete.reason.startswith("4 damaged lines were left out, the first of")
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -164,6 +175,16 @@ def test_where_no_line_is_good_the_file_is_refused(tmp_path: Path, name: str) ->
         written(tmp_path / "empty.txt", []).streams()
     with pytest.raises(BadInput):
         written(tmp_path / "head.txt", rows[:-COUNT]).streams()
+
+
+@pytest.mark.parametrize("name", ["CSV", "CSV of dates"])
+def test_a_table_that_is_not_as_its_header_says_is_no_damage(tmp_path: Path, name: str) -> None:
+    """Decimal commas between commas, or units in cells: many rows in vain, and one in the end."""
+    rows = lines(name)
+    for k in range(3, COUNT, 5):
+        rows[1 + k] = rows[1 + k] + rows[1][4:5] + b",5;5"
+    with pytest.raises(BadInput, match="cells"):
+        written(tmp_path / "run.csv", rows).streams()
 
 
 def test_a_header_settles_how_many_fields_where_rows_disagree(tmp_path: Path) -> None:

@@ -2,13 +2,13 @@
 
 Columns may be separated by commas, semicolons, tabs or bars; lines that begin with `#` are
 comments, the last of which may hold the names.  Every row has as many cells as the header; only
-the last one may be cut off.
+the last one may be cut off, and a few may be damaged where they are counted (`Losses`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -19,6 +19,7 @@ from syncline_design.logs.cells import ISO, NOTHING
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.csv_cells import cells_of
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.spec.load import BadInput
 
 if TYPE_CHECKING:
     import polars as pl
@@ -27,6 +28,7 @@ BLOCK_BYTES = 1 << 20
 MOST_HEAD = 1 << 20  # bytes in which the names have to come
 MOST_LINE = 1 << 22
 MOST_COLUMNS = 5_000
+MOST_DAMAGED = 0.1  # of the lines; where more are not as the header says, it is how it was written
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 COMMENT, QUOTE, NEWLINE, BLANK = b"#"[0], b'"'[0], b"\n"[0], b" "[0]
 BOM = b"\xef\xbb\xbf"
@@ -211,8 +213,40 @@ def last_line(path: Path, start: int) -> tuple[int, str] | None:
     return first + at, tail[at:].decode("utf-8", errors="replace")
 
 
-def blocks(path: Path, how: Dialect, end: int) -> Iterator[RowBlock]:
-    """All rows up to an offset, in order; refuses a row that has not the header's cells."""
+@dataclass(slots=True)
+class Losses:
+    """Damaged lines that are left out, instead of refusing their file for them.
+
+    demand: what a block of rows has to stand besides having the header's cells; raises BadInput.
+    """
+
+    demand: Callable[[RowBlock], object]
+    count: int = 0
+    first: BadInput | None = None
+
+    def add(self, error: BadInput, lines: int) -> None:
+        """One more of so many lines; refuses where they are more than damage explains."""
+        self.count += 1
+        self.first = self.first or error
+        if self.count > MOST_DAMAGED * lines:
+            raise self.first
+
+    def said(self) -> str:
+        """For people; empty where every line was read."""
+        if self.first is None:
+            return ""
+        (flaw,) = self.first.problems
+        if self.count == 1:
+            return f"1 damaged line was left out, line {flaw.line}: {flaw.message}"
+        lines = f"{self.count} damaged lines were left out"
+        return f"{lines}, the first of them line {flaw.line}: {flaw.message}"
+
+
+def blocks(path: Path, how: Dialect, end: int, losses: Losses | None = None) -> Iterator[RowBlock]:
+    """All rows up to an offset, in order; refuses a row that has not the header's cells.
+
+    losses: where such rows go instead.
+    """
     line, rest = how.body_line, b""
     with path.open("rb") as file:
         file.seek(how.body)
@@ -228,9 +262,43 @@ def blocks(path: Path, how: Dialect, end: int) -> Iterator[RowBlock]:
             if len(rest) > MOST_LINE:
                 raise refuse(path, f"a line longer than {MOST_LINE >> 20} MiB", line=line, column=1)
             if cut:
-                found, line = _block(path, how, _plain(raw[:cut]), line)
+                plain = _plain(raw[:cut])
+                if losses is None:
+                    found, line = _block(path, how, plain, line)
+                else:
+                    found = _joined(_good(path, how, plain, line, losses))
+                    line += plain.count(b"\n")
                 if found is not None:
                     yield found
+
+
+def _good(
+    path: Path, how: Dialect, raw: bytes, line: int, losses: Losses, lines: int = 0
+) -> Iterator[RowBlock]:
+    """What is good of a block: it is halved as long as there is a damaged line in it."""
+    lines = lines or line - how.body_line + raw.count(b"\n")
+    try:
+        found, _ = _block(path, how, raw, line)
+        if found is not None:
+            losses.demand(found)
+            yield found
+    except BadInput as error:
+        middle = raw.rfind(b"\n", 0, len(raw) // 2) + 1 or raw.find(b"\n") + 1
+        if middle == len(raw):
+            losses.add(error, lines)
+            return
+        yield from _good(path, how, raw[:middle], line, losses, lines)
+        after = line + raw.count(b"\n", 0, middle)
+        yield from _good(path, how, raw[middle:], after, losses, lines)
+
+
+def _joined(found: Iterable[RowBlock]) -> RowBlock | None:
+    pieces = list(found)
+    if len(pieces) < 2:
+        return pieces[0] if pieces else None
+    return RowBlock(
+        b"".join(piece.text for piece in pieces), np.concatenate([p.lines for p in pieces])
+    )
 
 
 def _last_break(raw: bytes) -> int:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.logs import delimited
 from syncline_design.logs.cells import (
     NO_TIME,
+    ONE_ZONE,
     BadCellError,
     iso_times,
     looks_like_a_date,
@@ -53,6 +54,7 @@ class CsvRecording(BatchRecording):
         self._text: set[int] = set()  # places of columns that hold names, not figures
         self._first_line = -1  # of the first row
         self._calendar = False
+        self._zoned: bool | None = None  # whether calendar times name their zone
         self._powers: dict[int, int] = {}  # of a thousand, by which a column of times is divided
         self._seen: Nanoseconds = np.zeros(0, dtype=np.int64)
 
@@ -64,7 +66,13 @@ class CsvRecording(BatchRecording):
         return self._how.names, self._how.line
 
     def _blocks(self) -> Iterator[delimited.RowBlock]:
-        return delimited.blocks(self.path, self._how, self._source.end)
+        self._losses = delimited.Losses(self._stamps)
+        return delimited.blocks(self.path, self._how, self._source.end, self._losses)
+
+    def _stamps(self, block: delimited.RowBlock) -> tuple[Nanoseconds | None, Nanoseconds | None]:
+        """Both times of the rows of a block."""
+        primary = self._times(block, self._layout.primary)
+        return primary, self._times(block, self._layout.secondary)
 
     def _demand_times(self) -> None:
         """One unit of the stamps, and something besides them or two of them."""
@@ -96,8 +104,7 @@ class CsvRecording(BatchRecording):
         rows = 0
         for block in self._blocks():
             rows += int(block.lines.shape[0])
-            primary = self._times(block, self._layout.primary)
-            secondary = self._times(block, self._layout.secondary)
+            primary, secondary = self._stamps(block)
             if primary is not None and self._layout.week is not None:
                 primary = self._with_week(block, primary)
             columns = self._columns(block) if wanted is not None or not seen else {}
@@ -111,20 +118,24 @@ class CsvRecording(BatchRecording):
         if not rows:
             raise refuse(self.path, "no rows below the header", line=self._title_line, column=1)
         self._seen = np.concatenate(seen) if seen else np.zeros(0, dtype=np.int64)
-        if self._is_cut():
-            self._cut("the last row is cut", rows)
+        reason = self._damage()
+        if reason:
+            self._cut(reason, rows)
 
-    def _is_cut(self) -> bool:
-        return bool(self._source.cut)
+    def _damage(self) -> str:
+        """What could not be read of the file; empty where all of it could."""
+        cut = "the last row is cut" if self._source.cut else ""
+        return "; ".join(part for part in (self._losses.said(), cut) if part)
 
     def _times(self, block: delimited.RowBlock, column: TimeColumn | None) -> Nanoseconds | None:
         if column is None:
             return None
         text = self._cells(block, column.place)
         try:
-            if not column.unit and looks_like_a_date(text):
+            if not column.unit and (self._calendar or looks_like_a_date(text)):
                 self._calendar = True
-                stamps, _ = iso_times(text)
+                stamps, zoned = iso_times(text)
+                self._demand_zone(text, zoned)
                 found: Nanoseconds = np.where(stamps == NO_TIME, UNSET, stamps)
                 return found
             unit = column.unit or self._refuse_bare(column)
@@ -133,6 +144,14 @@ class CsvRecording(BatchRecording):
             return exact_stamps(text, unit, self._powers[column.place])
         except BadCellError as bad:
             raise self._bad(block, column.place, bad) from None
+
+    def _demand_zone(self, text: pl.Series, zoned: bool | None) -> None:
+        """A zone in every row of the file, or in none."""
+        if self._zoned is None:
+            self._zoned = zoned
+        elif zoned is not None and zoned != self._zoned:
+            row = int(text.is_not_null().arg_max() or 0)
+            raise BadCellError(row, str(text[row]), ONE_ZONE)
 
     def _refuse_bare(self, column: TimeColumn) -> str:
         raise refuse(

@@ -40,8 +40,8 @@ class ParquetRecording(CsvRecording):
             lines = np.arange(start, min(start + ROWS, self._table.rows))
             yield RowBlock(b"", lines)
 
-    def _is_cut(self) -> bool:
-        return False
+    def _damage(self) -> str:
+        return ""
 
     def _times(self, block: RowBlock, column: TimeColumn | None) -> Nanoseconds | None:
         if column is None or not self._table.is_calendar(column.name):
