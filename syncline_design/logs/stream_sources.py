@@ -31,6 +31,7 @@ from syncline_design.logs.one_frame import (
     seconds_of,
     slope_of,
 )
+from syncline_design.logs.places import geodetic_to_ned
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer, Part, Role, parts_of
@@ -224,7 +225,7 @@ def _source(
         names = (*POSITION, *GEODETIC)
         columns |= {prefix + n: one.columns[n] for n in names if n in one.columns}
     for role, names in _ROLE_COLUMNS.items():
-        if role in roles:
+        if role in roles and not (role == "velocity" and "reference" in roles):
             columns |= {prefix + n: one.columns[n] for n in names if n in one.columns}
     if "target" in roles:
         names = (*TARGET, TARGET_ID, *(f"target_{g}" for g in GEODETIC))
@@ -245,15 +246,57 @@ def _of_reference(one: StreamValues, prefix: str, pair: bool) -> dict[str, Array
     columns = {n: one.columns[p] for n, p in zip(REFERENCE, POSITION, strict=True)
                if p in one.columns}  # fmt: skip
     columns |= {f"reference_{g}": one.columns[g] for g in GEODETIC if g in one.columns}
-    seconds = seconds_of(one.time_ns)
-    if one.has(VELOCITY[:2]):
-        level = np.zeros(one.time_ns.shape)
-        columns |= {prefix + n: one.columns.get(n, level) for n in VELOCITY}
-    elif one.has(POSITION[:2]):
-        places = one.vectors(POSITION) if POSITION[2] in one.columns else flattened(one)
-        slope = slope_of(seconds, places)
-        one.note("velocity was derived from its places, at its own rate (smoothing spline)")
-        columns |= {prefix + n: slope[:, k] for k, n in enumerate(VELOCITY)}
+    motion = _motion(one)
+    if motion is not None:
+        columns |= {prefix + n: motion[:, k] for k, n in enumerate(VELOCITY)}
     if pair and one.has(ATTITUDE):
         columns |= {n: one.columns[a] for n, a in zip(REFERENCE_ATTITUDE, ATTITUDE, strict=True)}
     return columns
+
+
+def _motion(one: StreamValues) -> Array | None:
+    """Velocities of a stream (n, 3): its own, and the slope of its places where it lacks them.
+
+    Receivers' sentences tell no vertical speed; some say speed and course less often than places.
+    None where it tells none and its places are not local yet: they are derived when they are.
+    """
+    nothing = np.full(one.time_ns.shape, np.nan)
+    own = np.stack([one.columns.get(n, nothing) for n in VELOCITY], axis=1)
+    lacking = ~np.isfinite(own)
+    local = one.has(POSITION[:2])
+    if np.all(lacking) and not local:
+        return None
+    if not np.any(lacking):
+        return own
+    places, level = _local_places(one)
+    if places is None:
+        return np.where(lacking & [False, False, True], 0.0, own)
+    _say_derived(one, lacking, level)
+    return np.where(lacking, slope_of(seconds_of(one.time_ns), places), own)
+
+
+def _local_places(one: StreamValues) -> tuple[Array | None, bool]:
+    """North, east, down of its places, of those in WGS 84 about the first; whether it is level."""
+    if one.has(POSITION[:2]):
+        level = POSITION[2] not in one.columns
+        return flattened(one) if level else one.vectors(POSITION), level
+    if not one.has(GEODETIC[:2]):
+        return None, True
+    heights = one.columns.get(GEODETIC[2], np.zeros(one.time_ns.shape))
+    globe = np.stack([*(one.columns[n] for n in GEODETIC[:2]), heights], axis=1)
+    known = np.flatnonzero(np.isfinite(globe).all(axis=1))
+    if not known.shape[0]:
+        return None, True
+    return geodetic_to_ned(globe, globe[known[0]]), GEODETIC[2] not in one.columns
+
+
+def _say_derived(one: StreamValues, lacking: Array, level: bool) -> None:
+    """Which velocities come of the places, and how."""
+    rows = int(np.count_nonzero(lacking[:, :2].any(axis=1)))
+    how = "derived from its places, at its own rate (smoothing spline)"
+    if rows == lacking.shape[0]:
+        one.note(f"velocity was {how}")
+    elif rows:
+        one.note(f"velocities of {rows} rows that have none were {how}")
+    if rows < lacking.shape[0] and not level and np.any(lacking[:, 2]):
+        one.note(f"velocity down, which it does not tell, was {how}")

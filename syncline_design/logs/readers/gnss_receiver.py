@@ -53,6 +53,7 @@ class ReceiverRecording(BatchRecording):
         self._names: dict[bytes, str] = library("pyubx2", path, FORMAT).UBX_MSGIDS
         self._known: dict[bytes, str] = {}
         self._tow_places: dict[str, int | None] = {}
+        self._vtg_leads = False
         self._first_day, self._first_week = self._first_moments()
         self._jumps: list[str] = []
         self._kinds: dict[str, str] = {}
@@ -63,20 +64,20 @@ class ReceiverRecording(BatchRecording):
         """The first sentence with a day, and the first message with a week."""
         day: int | None = None
         week: int | None = None
-        good = 0
+        good, told = 0, False
         with self.path.open("rb") as file:
             for what, body in frames(file, FrameCount()):
                 good += 1
-                if what == "nmea" and day is None:
+                if what == "nmea" and (day is None or not told):
                     said = nmea.parsed(body)
+                    self._vtg_leads |= said.kind == "VTG" and not told
+                    told = told or said.kind in nmea.PLACES
                     own = nmea.day_ns(said)
-                    if own is not None and said.tod_ns not in (None, UNSET):
+                    if day is None and own is not None and said.tod_ns not in (None, UNSET):
                         day = own + (said.tod_ns or 0)
                 elif what == "ubx" and week is None:
-                    row = _row(body)
-                    tow = UNSET if row is None else ubx.tow_ns(body[:2], row)
-                    week = None if tow == UNSET else ubx.said_moment(body[:2], row, tow)
-                if day is not None and week is not None:
+                    week = _week_said(body)
+                if day is not None and week is not None and told:
                     break
         if not good:
             raise refuse(self.path, "no sentence or message with a right checksum")
@@ -84,7 +85,7 @@ class ReceiverRecording(BatchRecording):
 
     def _batches(self, wanted: str | None) -> Iterator[Batch]:
         days, weeks = nmea.DayClock(self._first_day), ubx.WeekClock(self._first_week)
-        fixes = nmea.Fixes()
+        fixes = nmea.Fixes(self._vtg_leads)
         count, total = FrameCount(), 0
         held: dict[str, _Rows] = {}
         if wanted == WHOLE and self._high is None:
@@ -250,11 +251,12 @@ class ReceiverRecording(BatchRecording):
         quantity: tuple[str, ...] = ()
         columns: tuple[str, ...] = ()
         if name == FIX:
-            moves = "RMC" in self._kinds.values()
+            moves = bool({"RMC", "VTG"} & set(self._kinds.values()))
             quantity = ("position", "velocity") if moves else ("position",)
             columns = nmea.FIX_COLUMNS
             notes += (
                 "sentences of one epoch (GGA, RMC, GLL, GNS, GST) are one fix",
+                *self._of_vtg(),
                 "height_m is the height above sea level plus the separation that GGA says",
                 "stamps are the times of the fixes: when they arrived is not in the log",
             )
@@ -276,6 +278,13 @@ class ReceiverRecording(BatchRecording):
             nature="measured" if quantity else "unknown",
             columns=columns,
         )
+
+    def _of_vtg(self) -> tuple[str, ...]:
+        """Which epoch its speed and course were taken as of."""
+        if "VTG" not in self._kinds.values():
+            return ()
+        side = "after" if self._vtg_leads else "before"
+        return (f"VTG carries no time: it counts with the fix {side} it, as the file begins",)
 
     def _facts_of_ubx(self, name: str) -> StreamFacts:
         if name in ("ESF-MEAS", "ESF-RAW"):
@@ -322,6 +331,13 @@ def _add_fix(held: dict[str, _Rows], fix: tuple[int, list[float]]) -> None:
     rows = held.setdefault(FIX, _Rows(timed=True))
     rows.stamps.append(fix[0])
     rows.values.append(fix[1])
+
+
+def _week_said(body: bytes) -> int | None:
+    """The moment that a message tells with its week; None where it tells none."""
+    row = _row(body)
+    tow = UNSET if row is None else ubx.tow_ns(body[:2], row)
+    return None if tow == UNSET else ubx.said_moment(body[:2], row, tow)
 
 
 def _row(body: bytes) -> Any:

@@ -150,25 +150,37 @@ def _iso(day: int) -> str:
 
 @dataclass(slots=True)
 class Fixes:
-    """Sentences of one epoch as one fix: GGA and RMC say the same place twice."""
+    """Sentences of one epoch as one fix: GGA and RMC say the same place twice.
 
+    vtg_leads: whether VTG, which carries no time, comes before the sentences of its epoch that do.
+    """
+
+    vtg_leads: bool = False
+    _ahead: dict[str, float] = field(default_factory=dict)
     _tod: int | None = None
     _stamp: int = UNSET
     _row: dict[str, float] = field(default_factory=dict)
 
     def add(self, sentence: Sentence, moment: int) -> tuple[int, list[float]] | None:
         """Take a sentence in; gives the fix before it where that is complete."""
+        if sentence.kind == "VTG":
+            self._fill(self._ahead if self.vtg_leads else self._row, sentence)
+            return None
         if sentence.tod_ns in (None, UNSET) or sentence.kind not in (*PLACES, "GST"):
             return None
         done = None
         if sentence.tod_ns != self._tod:
             done = self.last()
-            self._tod, self._row = sentence.tod_ns, {}
+            self._tod, self._row, self._ahead = sentence.tod_ns, self._ahead, {}
         self._stamp = moment
-        for name, value in _said(sentence).items():
-            if math.isnan(self._row.get(name, NAN)):
-                self._row[name] = value
+        self._fill(self._row, sentence)
         return done
+
+    def _fill(self, row: dict[str, float], sentence: Sentence) -> None:
+        """What a sentence says and no other of the epoch said before it."""
+        for name, value in _said(sentence).items():
+            if math.isnan(row.get(name, NAN)):
+                row[name] = value
 
     def last(self) -> tuple[int, list[float]] | None:
         """The fix gathered so far, if there is a place in it."""
@@ -196,6 +208,10 @@ def _said(sentence: Sentence) -> dict[str, float]:
         return {**_place(f, 2), **heights, "hdop": number(_field(f, 8))}
     if sentence.kind == "RMC" and _field(f, 2) == "A":
         return {**_place(f, 3), **_ground_velocity(number(_field(f, 7)), number(_field(f, 8)))}
+    if sentence.kind == "VTG" and _field(f, 2) == "T" and _field(f, 9) != "N":
+        knots, kmh = number(_field(f, 5)), number(_field(f, 7))
+        known = knots if math.isfinite(knots) else kmh / 1.852
+        return _ground_velocity(known, number(_field(f, 1)))
     if sentence.kind == "GLL" and _field(f, 6) == "A":
         return _place(f, 1)
     if sentence.kind == "GST":
