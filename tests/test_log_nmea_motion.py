@@ -90,7 +90,7 @@ def test_the_motion_of_a_reference_in_nmea_is_whole(tmp_path: Path, order: str) 
     assert antenna is not None
     of_day = (TRUTH.stamp_ns % (86_400 * 10**9)) / 1e9
     truth = np.stack([np.interp(log.time_s, of_day, v) for v in TRUTH.velocity.T], axis=1)
-    inside = slice(20, -20)
-    assert np.sqrt(np.mean((velocity - truth)[inside] ** 2, axis=0)) == pytest.approx(0, abs=0.02)
+    inside, near = slice(20, -20), 0.02 if own == ["fix"] else 0.15  # the rover's is 80 ms late
+    assert np.sqrt(np.mean((velocity - truth)[inside] ** 2, axis=0)) == pytest.approx(0, abs=near)
     late_s = -np.sum((antenna - log.truth_m) * velocity) / np.sum(velocity**2)
     assert late_s == pytest.approx(LATE_S, abs=1e-3)
