@@ -38,6 +38,7 @@ lint: $(DEV)
 bench: $(DEV)
 	$(PIP) -e '.[bench]'
 	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/whole_process.py
 	$(BIN)/python benchmarks/choice.py
 	$(BIN)/python benchmarks/simulate.py
 	$(BIN)/python benchmarks/diagnose.py

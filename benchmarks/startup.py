@@ -14,7 +14,8 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 SPECS = Path(__file__).parent.parent / "specs"
@@ -40,6 +41,15 @@ def spent(command: tuple[str, ...], environment: Mapping[str, str]) -> tuple[flo
     return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / scale
 
 
+@contextmanager
+def compiled_once() -> Iterator[dict[str, str]]:
+    """An environment in which the bytecode of a first run is there for all that follow."""
+    with tempfile.TemporaryDirectory() as bytecode:
+        environment = {**os.environ, "PYTHONPYCACHEPREFIX": bytecode}
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        yield environment
+
+
 def table(found: Mapping[str, list[tuple[float, float]]]) -> list[str]:
     """Lines of medians and leasts with their ratios to the first command."""
     seconds = {name: [t for t, _ in pairs] for name, pairs in found.items()}
@@ -61,9 +71,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=7)
     runs = parser.parse_args().runs
-    with tempfile.TemporaryDirectory() as bytecode:
-        environment = {**os.environ, "PYTHONPYCACHEPREFIX": bytecode}
-        environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    with compiled_once() as environment:
         for command in COMMANDS.values():  # compiles, and fills the caches of the file system
             spent(command, environment)
         found: dict[str, list[tuple[float, float]]] = {name: [] for name in COMMANDS}
