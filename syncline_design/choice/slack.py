@@ -20,12 +20,14 @@ from syncline_design.choice.edges import CLOSE, edge, first_failing, tried
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate, pair_bound
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.narrowed import kept
+from syncline_design.choice.option import Option
 from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime, Unfinished
 from syncline_design.choice.parts import SIMULATED
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.ranked import iter_best
-from syncline_design.choice.table import NOTHING, Design, Problem
+from syncline_design.choice.rivals import Changed, Growing, rivals
+from syncline_design.choice.table import NOTHING, Design, Problem, RoleTable
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
     PLATFORM_UNITS,
@@ -35,6 +37,7 @@ from syncline_design.choice.variations import (
 )
 from syncline_design.choice.what_if import (
     WhatIf,
+    hangs_on_motion,
     of_method,
     of_sensor,
     platform_what_if,
@@ -92,9 +95,8 @@ def slack_ledger(
                 rows.append(_tau_slack(asked, r))
         what_if = platform_what_if(case, problem, build, index)
         for figure in PLATFORM_FIGURES:
-            row = _platform_slack(
-                asked, float(platform_figure(case, index, figure)), figure, what_if
-            )
+            value = float(platform_figure(case, index, figure))
+            row = _platform_slack(asked, value, figure, what_if, _moved(case, problem, index))
             rows += [replace(row, stage=stage.name)] if row else []
     return tuple(rows)
 
@@ -128,15 +130,24 @@ def _error_slack(asked: _Asked, r: int) -> Slack:
     problem, design = asked.problem, asked.design
     table, own = problem.roles[r], chosen_options(problem, design)[r]
     limit, fails = problem.limits.accuracy_m, error_limit(problem, design, r)
-    rows = of_sensor(problem, r, design.options[r])
 
-    def changed(value: float) -> Problem:
-        return with_sensor_error(problem, r, rows, Fraction(value))
+    def vary(problem: Problem, design: Design) -> Changed:
+        rows = of_sensor(problem, r, design.options[r])
+        return lambda value: with_sensor_error(problem, r, rows, Fraction(value))
 
     row = Slack(f"{table.role} sensor error", table.stage_name, own.sensor_error_m, "m", fails,
                 None if fails is None else "accuracy", None)  # fmt: skip
     sure = limit is None and problem.judge is None
-    return _with_payload(row, asked, changed, fails_never=sure)
+    worse = all(option.noise_systematic_m >= 0 for option in _alike(problem, design, r))
+    return _with_payload(row, asked, Growing(vary, (r,), only_worse=worse), fails_never=sure)
+
+
+def _alike(problem: Problem, design: Design, r: int) -> Iterator[Option]:
+    """The options of a role that have the sensor of a design's."""
+    pool = problem.roles[r].pool()
+    return (
+        pool[place] for place in np.flatnonzero(of_sensor(problem, r, design.options[r])).tolist()
+    )
 
 
 def error_limit(problem: Problem, design: Design, r: int) -> float | None:
@@ -157,13 +168,12 @@ def _tau_slack(asked: _Asked, r: int) -> Slack:
     row = Slack(f"{table.role} timestamp error", table.stage_name, own.tau_s, "s",
                 None if fails is None else float(fails), kind, None)  # fmt: skip
 
-    rows = of_method(problem, r, design.options[r])
-
-    def changed(value: float) -> Problem:
-        return with_method_tau(problem, r, rows, Fraction(value))
+    def vary(problem: Problem, design: Design) -> Changed:
+        rows = of_method(problem, r, design.options[r])
+        return lambda value: with_method_tau(problem, r, rows, Fraction(value))
 
     sure = not limits and problem.judge is None
-    return _with_payload(row, asked, changed, fails_never=sure)
+    return _with_payload(row, asked, Growing(vary), fails_never=sure)
 
 
 def tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
@@ -196,10 +206,21 @@ def tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
     yield min(allowed - other for other in others.values()), "accuracy"
 
 
+def _moved(case: Case, problem: Problem, stage: int) -> tuple[int, ...] | None:
+    """The roles that a stage's platform moves; None where more hangs on how it moves."""
+    if hangs_on_motion(case, problem):
+        return None
+    return tuple(r for r, table in enumerate(problem.roles) if table.stage == stage)
+
+
 def _platform_slack(
-    asked: _Asked, value: float, figure: PlatformFigure, what_if: WhatIf
-) -> Slack | None:
-    """Growth of a platform figure: the same design evaluated, and the choice made, anew."""
+    asked: _Asked, value: float, figure: PlatformFigure, what_if: WhatIf,
+    moved: tuple[int, ...] | None,
+) -> Slack | None:  # fmt: skip
+    """Growth of a platform figure: the same design evaluated, and the choice made, anew.
+
+    moved: the roles that it moves, where designs only get worse.
+    """
     if value <= 0.0:
         return None
     alone, only = asked.alone()
@@ -216,10 +237,12 @@ def _platform_slack(
     kind = None if fails is None else next(iter(kinds_broken(fails)), None)
     row = Slack(PLATFORM_FIGURES[figure][0], "", value, unit, fails, kind, None)
 
-    def changed(at: float) -> Problem:
-        return what_if(asked.problem, figure, at)
+    def vary(problem: Problem, _: Design) -> Changed:
+        return lambda at: what_if(problem, figure, at)
 
-    return _with_payload(row, asked, changed, fails_never=False)
+    noisier = moved or () if figure == "distance" else ()
+    growing = Growing(vary, noisier, RoleTable.anywhere, only_worse=moved is not None)
+    return _with_payload(row, asked, growing, fails_never=False)
 
 
 def gone(problem: Problem) -> str:
@@ -237,22 +260,28 @@ def payload(problem: Problem, design: Design) -> tuple[tuple[str, str], ...]:
     return tuple((option.sensor, option.method) for option in chosen_options(problem, design))
 
 
-def _with_payload(
-    row: Slack, asked: _Asked, changed: Callable[[float], Problem], *, fails_never: bool
-) -> Slack:
+def _with_payload(row: Slack, asked: _Asked, growing: Growing, *, fails_never: bool) -> Slack:
     """The row with the least value at which the choice, made anew, names another payload.
 
-    Every value is solved again: a term that grows can lose a tie of price long before a limit, and
-    a worse sensor can make a cheaper design keep its sync limit.
+    A term that grows can lose a tie of price long before a limit, and a worse sensor can make a
+    cheaper design keep its sync limit: every value is solved again, among the design's rivals as
+    long as it stands itself, else among all designs.
     """
     problem, design = asked.problem, asked.design
+    changed = growing.vary(problem, design)
     row = _simulated(row, problem, design, changed, asked.kinds)
     never = ("verdict",) if fails_never else ()
     if fails_never and _is_sole(problem):
         return replace(row, never=(*never, "payload"))
     now = payload(problem, design)
+    few = None
+    if problem.judge is None:
+        few = rivals(problem, design, growing, row.value, asked.beside)
 
     def same(at: float) -> bool:
+        best = None if few is None else few.best(at)
+        if best is not None:
+            return payload(*best) == now
         other = changed(at)
         own = same_design(problem, design, other)
         if other.judge is not None and own is not None and not _stands(other, own):
