@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,12 +23,13 @@ from syncline_design.logs.stream_times import ASSUMED_GPS
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
 from tests import flat_flight_logs as made
-from tests.flight_logs import ORIGIN, TO_ENU, TO_FLU, Flight, flight, geodetic
+from tests.flight_logs import ORIGIN, TO_ENU, TO_FLU, Flight, flight, geodetic, write_ulog
 from tests.test_diagnose_recordings import FIXES, LATE_S, TRUTH, found, latency
 
 pytest.importorskip("pyubx2")
 
 FLOWN = flight(8.0)
+SECOND = 10**9
 DEGREE_M = 111_320.0
 EXACT_NS, MICROSECOND, MILLISECOND = 0, 1_000, 1_000_000
 # writer, stream, error of a stamp [ns], of a place [m], of a velocity [m/s], of an attitude [deg]
@@ -202,6 +204,42 @@ def test_the_clock_of_week_seconds_is_the_specs_else_gps_and_said(
     said = "in UTC, as the spec says" if told == "utc" else "in GPS, as the spec says"
     assert any((said if told else ASSUMED_GPS) in note for note in notes)
     assert any("wander" in note for note in notes)
+
+
+def test_all_streams_since_boot_are_made_utc_beside_the_one_that_tells_it(tmp_path: Path) -> None:
+    """The receiver's own stream, which pairs boot and UTC, plays a part itself."""
+    files = [
+        made.write_nmea(tmp_path / "gnss.log", FIXES),
+        write_ulog(tmp_path / "flight.ulg", TRUTH),
+    ]
+    late_s, notes = rows_of(files, LogChoice())
+    assert late_s == pytest.approx(LATE_S, abs=1e-3)
+    assert sum("stamps since boot were made UTC" in note for note in notes) >= 2
+
+
+@pytest.mark.parametrize("week", [None, 2416])
+@pytest.mark.parametrize("wraps", [True, False])
+def test_a_week_that_ends_within_the_log_goes_on(
+    tmp_path: Path, wraps: bool, week: int | None
+) -> None:
+    """Seconds of the week begin again or run past 604 800: every row is there, in its order."""
+    ends = week_start_ns(2417) - made.LEAPS * SECOND  # as UTC's calendar reads
+    shift = ends - 20 * SECOND - int(TRUTH.stamp_ns[0])
+    moved = [replace(one, stamp_ns=one.stamp_ns + shift) for one in (FIXES, TRUTH)]
+    fixes = made.write_nmea(tmp_path / "gnss.log", moved[0])
+    reference = made.write_sbet(tmp_path / "ref.out", moved[1])
+    whole = np.fromfile(reference, dtype="<f8").reshape(-1, 17)
+    assert whole[-1, 0] < whole[0, 0]
+    if not wraps:
+        whole[:, 0] += 604_800.0 * (whole[:, 0] < whole[0, 0])
+    whole.tofile(reference)
+    choice = LogChoice.model_construct(gps_week=week)
+    read = read_log(row_sources([fixes, reference], choice, ["uav"], poses=False), ["uav"],
+                    needs_ranging=False)  # fmt: skip
+    assert len(read) > 440
+    late_s, notes = rows_of([fixes, reference], choice)
+    assert late_s == pytest.approx(LATE_S, abs=1e-3)
+    assert any("into the next week" in note for note in notes) == wraps
 
 
 @pytest.mark.parametrize("rates", ["about the vertical", "not filled in"])

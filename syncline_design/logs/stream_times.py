@@ -43,9 +43,10 @@ def on_one_timeline(several: Sequence[StreamValues], choice: LogChoice) -> bool:
     if not calendars:
         _demand_one_zero(several, timelines)
         return False
+    pairs = {id(one.offer.recording): _boot_pairs(one, several) for one in others}
     for one in others:
         if timelines[id(one)] == "boot":
-            _booted(one, several)
+            _booted(one, pairs[id(one.offer.recording)])
         else:
             raise refuse(
                 one.offer.path,
@@ -81,6 +82,7 @@ def _with_weeks(
     """
     lacking = [one for one in several if timelines[id(one)] == "unknown" and _counts_weeks(one)]
     for one in lacking:
+        _over_week_end(one)
         week, source = choice.gps_week, "as the spec says"
         if week is None:
             week, source = _week_beside(one, several, timelines)
@@ -93,6 +95,20 @@ def _with_weeks(
         one.note(f"seconds of the week are of GPS week {week}, {source}")
         clock = f"in {told.upper()}, as the spec says" if told else f"{ASSUMED_GPS} ({TELL_CLOCK})"
         one.note(f"seconds of the week are {clock}")
+
+
+def _over_week_end(one: StreamValues) -> None:
+    """Seconds of the week that begin again within a log go on: the first are of the next week.
+
+    Told by their size, whatever the order of the rows: no log lasts half a week.
+    """
+    known = one.time_ns != UNSET
+    half = WEEK_S * NANO // 2
+    last = int(one.time_ns[known].max()) if np.any(known) else 0
+    again = known & (one.time_ns < last - half)
+    if np.any(again):
+        one.time_ns = np.where(again, one.time_ns + 2 * half, one.time_ns)
+        one.note("seconds of the week that begin again were counted on, into the next week")
 
 
 def _week_beside(
@@ -131,14 +147,18 @@ def _as_utc(one: StreamValues, kind: Timeline) -> None:
     one.note(f"{name} stamps were made UTC: {apart} s taken off (leap second table)")
 
 
-def _booted(one: StreamValues, several: Sequence[StreamValues]) -> None:
-    """Stamps since boot by the recording's own pairs of boot and UTC."""
+def _boot_pairs(one: StreamValues, several: Sequence[StreamValues]) -> Nanoseconds:
+    """UTC minus boot [ns] of the messages of a recording that tell both, as the file has them."""
     pairs = [
         other.columns[UTC_CLOCK].astype(np.int64) - other.time_ns
         for other in several
         if other.offer.recording is one.offer.recording and UTC_CLOCK in other.columns
     ]
-    apart = np.concatenate(pairs) if pairs else np.zeros(0, dtype=np.int64)
+    return np.concatenate(pairs) if pairs else np.zeros(0, dtype=np.int64)
+
+
+def _booted(one: StreamValues, apart: Nanoseconds) -> None:
+    """Stamps since boot by the recording's own pairs of boot and UTC."""
     apart = apart[apart > EARLIEST_NS]
     if apart.shape[0] < LEAST_PAIRS:
         raise refuse(
