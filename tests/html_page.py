@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from html.parser import HTMLParser
 
+JOINT = "\0"  # between a word that no line breaks and what stands beside it
 VOID = {"meta", "input", "br", "img", "link", "hr", "wbr"}
 
 
@@ -13,6 +14,7 @@ class Page(HTMLParser):
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
+        self.whole = 0  # tags open where a word of an element of its own began
         self.open: list[str] = []
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.scripts: list[str] = []
@@ -25,6 +27,9 @@ class Page(HTMLParser):
         self.tags.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
+        if (tag, dict(attrs).get("class")) == ("span", "whole"):
+            self.texts += [JOINT]
+            self.whole = len(self.open)
         if tag == "script":
             self.scripts.append("")
 
@@ -32,6 +37,9 @@ class Page(HTMLParser):
         self.tags.append((tag, dict(attrs)))
 
     def handle_endtag(self, tag: str) -> None:
+        if len(self.open) == self.whole:
+            self.texts += [JOINT]
+            self.whole = 0
         if not self.open or self.open.pop() != tag:
             self.unbalanced.append(tag)
 
@@ -43,7 +51,7 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        return re.sub(r"[ \n\t]+", " ", " ".join(self.texts))
+        return re.sub(r"[ \n\t]+", " ", " ".join(self.texts).replace(f" {JOINT} ", ""))
 
     def attribute(self, tag: str, name: str) -> list[str]:
         return [found[name] or "" for t, found in self.tags if t == tag and name in found]

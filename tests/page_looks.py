@@ -22,6 +22,16 @@ FLAWS = """(width) => {
       if (box.width < 90 && box.height > 190) flaws.push('squeezed: ' + cell.innerText);
     });
   });
+  const list = document.querySelector('nav ul');
+  const mark = getComputedStyle(list.parentElement, '::after').content;
+  if (list.scrollWidth > list.clientWidth + 1 && mark === 'none')
+    flaws.push('sections cut without a hint');
+  document.querySelectorAll('section tbody th, section p, section dd, section td').forEach(e => {
+    if (!seen(e)) return;
+    e.querySelectorAll('.whole').forEach(word => {
+      if (word.getClientRects().length > 1) flaws.push('broken: ' + word.innerText);
+    });
+  });
   document.querySelectorAll('h3').forEach(head => {
     const next = head.nextElementSibling;
     if (seen(head) && !(next && (next.innerText.trim() || next.querySelector('svg'))))

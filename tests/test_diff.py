@@ -73,6 +73,7 @@ def test_one_change_names_cause_payload_and_price(files: tuple[Path, Path]) -> N
     assert [(c.key, c.old, c.new) for c in data.causes] == [
         ("stages[uav].distance", "100 m", "40 m")
     ]
+    assert [part.key for part in on_diff(data).sections][:2] == ["margins", "causes"]
     cost = next(s for s in data.sums if s.name == "cost")
     assert cost.change == after["design"]["cost"] - before["design"]["cost"] != 0
     roles = [entry.role for entry in data.payload]

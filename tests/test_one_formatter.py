@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from html_page import Page
 from syncline_design.model.figure_text import (
     format_nats,
     percent,
@@ -18,7 +19,12 @@ from syncline_design.model.figure_text import (
     to_digits,
     to_places,
 )
+from syncline_design.model.unit_table import UNITS
 from syncline_design.report import numbers
+from syncline_design.report.console_table import folded
+from syncline_design.report.document import Document, Outcome, Text, section
+from syncline_design.report.render_html import html
+from syncline_design.report.text import unbroken
 
 PACKAGE = Path(__file__).parent.parent / "syncline_design"
 # What formats a float by itself, and why.
@@ -131,6 +137,18 @@ def test_nats_have_their_thousands_apart(value: float, digits: int | None, text:
     assert format_nats(value, digits) == text
 
 
+@pytest.mark.parametrize("unit", [*UNITS, "nat", "m/s\u00b2", "\u03c3"])
+def test_no_line_ends_between_a_figure_and_its_unit(unit: str) -> None:
+    """In every unit that a spec or a page can write, in a page and on the console."""
+    told = section("x", "Found", [Text(f"It is up to 12.5 {unit}, 3 rows, `5 {unit}`.")])
+    shown = Document("x", Outcome("good", "+", "x"), "x", (), (), tuple(told))
+    printed = f"\u00b5{unit[1:]}" if unit.startswith("u") else unit
+    assert f"12.5\u00a0{printed}, 3 rows, " in Page(html(shown)).text
+    assert f"5 {unit}" in Page(html(shown)).texts  # code is what a program knows
+    lines = folded(f"It is up to 12.5 {unit}", 16)
+    assert lines == ["It is up to", f"12.5 {unit}"]  # 16 columns: the figure would fit alone
+
+
 def test_no_line_ends_inside_a_figure_of_nats() -> None:
-    told = numbers.unbroken("saves 13 436.0 nat; 3 000 rows, 2026 100 was 12 of 1000")
+    told = unbroken("saves 13 436.0 nat; 3 000 rows, 2026 100 was 12 of 1000")
     assert told.replace("\u00a0", "_") == "saves 13_436.0_nat; 3_000 rows, 2026_100 was 12 of 1000"

@@ -32,7 +32,7 @@ from syncline_design.model.known import EffectEntry
 from syncline_design.paper.plots import SimulatedPoint
 from syncline_design.paper.reproduce import reproduce
 from syncline_design.report import numbers
-from syncline_design.report.document import TableNode
+from syncline_design.report.document import Chart, TableNode
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_joint import scope_nodes
 from syncline_design.report.on_paper import on_paper
@@ -40,7 +40,7 @@ from syncline_design.report.on_simulation import on_simulation
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
-from syncline_design.report.text import visible
+from syncline_design.report.text import unbroken, visible
 from syncline_design.report.words import effect_words
 from syncline_design.simulation import SimulationSettings, simulate
 from syncline_design.simulation.comparison import CAUSES
@@ -129,7 +129,7 @@ def test_reproduction_shows_printed_beside_computed() -> None:
         "519.62\u00a0ms", "44 of 46 agree, 2 documented errata", "Printed 1.67 m.", "10 per metre",
         "B \u00b7 ",
     ):  # fmt: skip
-        assert words in page.text
+        assert unbroken(words) in page.text
     assert page.attribute("article", "id") == [f"figure-{number}" for number in range(1, 8)]
     assert html(on_paper(result)) == html(on_paper(reproduce(simulate=False, seed=0)))
 
@@ -162,7 +162,7 @@ def test_simulation_tells_ratio_reason_and_certificate() -> None:
     assert said
     for row in result.grid:  # the share of each cause beside its name, `tilt (up to 1.2 %)`
         for cause, share in zip(row.causes, re.findall(r"\(([^()]*%)\)", row.reason), strict=True):
-            assert f"{cause.replace('_', ' ')} ({numbers.unbroken(share)})" in page.text
+            assert f"{cause.replace('_', ' ')} ({unbroken(share)})" in page.text
     fold = page.text[page.text.index("Worst case and Syncline at every") :]
     for cause in set(said):
         assert fold.count(CAUSES[cause]) == 1
@@ -201,7 +201,7 @@ def diagnosed() -> Page:
     ],
 )
 def test_diagnosis_says(diagnosed: Page, words: str) -> None:
-    assert words in diagnosed.text
+    assert unbroken(words) in diagnosed.text
 
 
 @pytest.mark.parametrize(
@@ -359,6 +359,22 @@ def test_a_column_of_many_logs_is_in_one_unit_and_in_words() -> None:
     ]  # fmt: skip
     assert shown.table.heads[2].text == "time constant"
     assert shown.table.caption == "filter lag (position) in each log"
+    assert shown.reach == "everywhere"  # no figure says the same
+
+
+def test_a_page_has_the_values_of_logs_once() -> None:
+    """Where a figure has them as its values; the console, which draws nothing, has the table."""
+    every = [Estimate(0.5, 0.003, "m", True, "50.0 \u00b1 0.3 cm", (0.494, 0.506)),
+             Estimate(-0.4, 0.004, "m", True, "-40.0 \u00b1 0.4 cm", (-0.408, -0.392))]  # fmt: skip
+    logs = tuple(PerLog(k, f"{k}.csv", f"#{k}", {"bias_m": one})
+                 for k, one in enumerate(every, 1))  # fmt: skip
+    found = replace(LATENCY, effect="range_bias", scope="log", per_log=logs, one_value=1e-4)
+    (shown,) = (node for node in scope_nodes(found) if isinstance(node, TableNode))
+    assert shown.reach == "text"
+    (drawn,) = (node for node in scope_nodes(found) if isinstance(node, Chart))
+    assert [dict(one.says)["95 % interval"] for one in drawn.draw().told] == [
+        "49.4\u00a0cm to 50.6\u00a0cm", "\u221240.8\u00a0cm to \u221239.2\u00a0cm",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from typer.testing import CliRunner, Result
 
 import syncline_design as sd
 from browsing import flaws_of
+from html_page import Page
 from syncline_design.campaign.changes import REACH, Changes, weight_of
 from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
 from syncline_design.campaign.pool import pool_of
@@ -353,7 +354,10 @@ def test_its_page_is_sound(browser: object, spec: Path, tmp_path: Path) -> None:
     runs = [run_of(one, day) for day, one in enumerate(series(11, 5, change, 3))]
     path = tmp_path / "watch.html"
     watch(kept(spec, tmp_path, runs), spec, "-o", f"html:{path}")
-    assert "fig-courses-2" in path.read_text("utf-8")
+    page = path.read_text("utf-8")
+    assert "fig-courses-2" in page
+    for label in ("syncline-design", "Spec, SHA-256", "Catalogs, SHA-256"):
+        assert label in Page(page).text
     assert flaws_of(browser, path) == []
 
 

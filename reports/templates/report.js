@@ -65,6 +65,16 @@
     frames.forEach(function (frame) { watch.observe(frame); });
   } else { frames.forEach(hint); }
 
+  // A list of sections that goes on beyond the window says so.
+  var sections = document.querySelector("nav ul");
+  function listed() {
+    var left = sections.scrollWidth - sections.clientWidth - sections.scrollLeft;
+    sections.parentElement.classList.toggle("beyond", left > 1);
+  }
+  sections.addEventListener("scroll", listed, { passive: true });
+  window.addEventListener("resize", listed);
+  listed();
+
   // A part that a link leads to is opened.
   function open() {
     var place = location.hash.length > 1 ? document.getElementById(decodeURIComponent(location.hash.slice(1))) : null;

@@ -207,10 +207,14 @@ def noise_within(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judg
         words = (f"up to {to_digits(most, 3)} times the spec's figure is nothing unusual on "
                  "this log, but turns the verdict")  # fmt: skip
         return Judgement("not_shown", words, figure)
-    words = (
-        f"{to_digits(factor, 3)} times the spec's figure{readings(own)}, nothing material beyond it"
-    )
+    words = f"{_times(factor)} the spec's figure{readings(own)}, nothing material beyond it"
     return Judgement("holds", words, figure)
+
+
+def _times(factor: float) -> str:
+    """`1.02 times`, `equal to`."""
+    text = to_digits(factor, 3)
+    return "equal to" if text == "1" else f"{text} times"
 
 
 def readings(own: NoiseFactors | None) -> str:

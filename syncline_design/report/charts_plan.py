@@ -41,8 +41,9 @@ def path(run: PlanRun) -> InlineChart:
                 tell(axes, *start, [("Mark", f"leg {k + 1} begins"), ("Place", _place(*start))])
                 starts.append(start)
         for words, at, colour in _numbered(starts, 0.08 * max(wide, high)):
-            axes.annotate(words, at, xytext=(-6, 6), textcoords="offset points", ha="center",
-                          va="center", color=colour, weight="bold", zorder=5)  # fmt: skip
+            label = beside(at, np.c_[east, north][::step], 0.05 * max(wide, high))
+            axes.text(*label, words, ha="center", va="center", color=colour, weight="bold",
+                      zorder=5)  # fmt: skip
         axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
                   "x", color=MUTED, markersize=4)  # fmt: skip
         for k, one in enumerate(run.result.targets, 1):
@@ -57,6 +58,17 @@ def path(run: PlanRun) -> InlineChart:
         f"{numbers.length(high, 3)} north to south, {len(run.result.targets)} targets"
     )
     return draw("fig-path", "Path from above", spoken, (WIDTH, 340.0), build)
+
+
+def beside(
+    at: tuple[float, float], drawn: np.ndarray, apart: float
+) -> tuple[float, float]:  # fmt: skip
+    """Of places around a point, `apart` from it [m], the one farthest from all that is drawn."""
+    angles = np.arange(16) * math.pi / 8.0
+    around = np.array(at) + apart * np.c_[np.cos(angles), np.sin(angles)]
+    free = [float(np.min(np.hypot(*(drawn - one).T))) for one in around]
+    x, y = around[int(np.argmax(free))]
+    return float(x), float(y)
 
 
 def _numbered(

@@ -10,6 +10,7 @@ from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
+from syncline_design.report.columns import padded
 from syncline_design.report.palette import BAD, MUTED, SERIES, SHADE
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
@@ -84,8 +85,7 @@ def _panel(
         tell(axes, run, v.value / scale, [
             ("Run", str(run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
             ("Value", f"{numbers.number(v.value / scale, 4)} {unit}"),
-            ("95 % interval", f"{numbers.number(low / scale, 4)} to "
-                              f"{numbers.number(high / scale, 4)} {unit}"),
+            ("95 % interval", _interval(low / scale, high / scale, unit)),
         ])  # fmt: skip
         axes.plot([run, run], [low / scale, high / scale], color=colour, linewidth=1.2)
     axes.plot([run for run, _ in shown], [v.value / scale for _, v in shown], "o", color=colour,
@@ -101,6 +101,12 @@ def _panel(
     axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
     _whole_ticks(axes, [r.run for r in runs])
     axes.margins(x=0.06)
+
+
+def _interval(low: float, high: float, unit: str) -> str:
+    """`45.00 ms to 52.08 ms`."""
+    ends = (numbers.typeset(f"{numbers.number(end, 4)} {unit}".strip()) for end in (low, high))
+    return " to ".join(padded(list(ends)))
 
 
 def _key(one: RunValue) -> Key:
@@ -166,8 +172,7 @@ def _logs_panel(
         axes.plot([one.log], [0.5 * (low + high) / scale], "o", color=SERIES[0], markersize=4)
         tell(axes, one.log, 0.5 * (low + high) / scale, [
             ("Log", f"{one.log}, {one.file}"), ("Value", own.text),
-            ("95 % interval", f"{numbers.number(low / scale, 4)} to "
-                              f"{numbers.number(high / scale, 4)} {unit}"),
+            ("95 % interval", _interval(low / scale, high / scale, unit)),
         ])  # fmt: skip
     figure, _, _ = parameter.rpartition("_")
     axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")

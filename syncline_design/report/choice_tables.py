@@ -98,8 +98,8 @@ def _excluded(options: Sequence[Exclusion]) -> Table | None:
         (
             f"{entry.stage} \u00b7 {entry.role}",
             Cell(str(entry.sensor), code=True),
-            PRIMITIVES.get(str(entry.primitive), entry.primitive or "\u2013"),
-            Cell(entry.method or "\u2013", code=True),
+            PRIMITIVES.get(str(entry.primitive), entry.primitive or numbers.MISSING),
+            Cell(entry.method or numbers.MISSING, code=True),
             entry.reason,
         )
         for entry in options

@@ -8,7 +8,7 @@ from textwrap import wrap
 from typing import Final
 
 from syncline_design.report.table import CORNER, Table, Tone, cell_words
-from syncline_design.report.text import visible
+from syncline_design.report.text import unbroken, visible
 
 GAP: Final = "  "
 _LONGEST_WORD: Final = 28  # a longer one does not hold its column open
@@ -25,7 +25,7 @@ def one_line(text: str) -> str:
 def folded(text: str, width: int, first: str = "", indent: str = "") -> list[str]:
     """Text in lines of a width; figures stay with their units."""
     lines = wrap(
-        visible(text), width, initial_indent=first, subsequent_indent=indent,
+        unbroken(visible(text)), width, initial_indent=first, subsequent_indent=indent,
         break_long_words=False, break_on_hyphens=False,
     )  # fmt: skip
     return [line.replace("\u00a0", " ") for line in lines] or [""]
@@ -34,7 +34,7 @@ def folded(text: str, width: int, first: str = "", indent: str = "") -> list[str
 def fitted(table: Table, room: int, paint: Paint | None = None) -> Iterator[str]:
     """The lines of a table without its caption, none longer than `room` where words allow it."""
     heads = [head.text for head in table.heads]
-    rows = [[cell_words(cell) for cell in row] for row in table.rows]
+    rows = [[unbroken(cell_words(cell)) for cell in row] for row in table.rows]
     widths = _widths(heads, rows, room)
     if widths is None:
         yield from _records(heads, rows, room)

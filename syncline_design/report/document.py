@@ -273,13 +273,15 @@ def provenance(pairs: Sequence[tuple[str, str]], reach: Audience = "page") -> li
     return section("provenance", "Provenance", [record] if pairs else [], reach=reach)
 
 
-def pins(version: str, spec_sha256: str, catalogs_sha256: str, seed: int) -> list[tuple[str, str]]:
-    """What a result of a spec is pinned by, for `provenance`."""
+def pins(
+    version: str, spec_sha256: str, catalogs_sha256: str, seed: int | None
+) -> list[tuple[str, str]]:
+    """What a result of a spec is pinned by, for `provenance`; no seed where nothing is drawn."""
     return [
         ("syncline-design", version),
         ("Spec, SHA-256", spec_sha256),
         ("Catalogs, SHA-256", catalogs_sha256),
-        ("Seed", str(seed)),
+        *([("Seed", str(seed))] if seed is not None else []),
     ]
 
 

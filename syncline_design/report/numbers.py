@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -198,14 +197,6 @@ def error(value: Any, limit: Limited | None, digits: int = 4) -> str:
 def nats(value: float, digits: int = 3) -> str:
     """A gain of likelihood, `160 000 nat`, typeset."""
     return typeset(figure_text.format_nats(value, digits))
-
-
-_GAP: Final = re.compile(r"(?<=\d) (?=\d{3}(?!\d)|nat\b|%)")
-
-
-def unbroken(text: str) -> str:
-    """A text in which no line ends between groups of digits, or before nat or %."""
-    return _GAP.sub("\N{NO-BREAK SPACE}", text)
 
 
 _DIMENSIONS: Final = {

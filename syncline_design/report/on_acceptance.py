@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 from syncline_design.comparison.acceptance import (
@@ -64,7 +64,7 @@ def on_acceptance(result: Acceptance) -> Document:
         facts=(),
         sections=(
             *section("assumptions", "What the verdict rests on, against the evidence",
-                     show(_table(result), silent=True), "Assumptions"),
+                     show(assumptions_table(result.assumptions), silent=True), "Assumptions"),
             *section("groups", "One of these is broken", _groups(result), "One of these"),
             *section("notes", "What the logs said besides", _notes(result), "Notes"),
             *section("evidence", "Evidence", show(_evidence(result), silent=True)),
@@ -160,28 +160,27 @@ def _measured(row: AssumptionResult) -> str:
     return f"{text} ({low} to {high})"
 
 
-def _table(result: Acceptance) -> Table:
+def assumptions_table(assumptions: Sequence[AssumptionResult]) -> Table:
+    """A row an assumption, headed by whose it is."""
     rows = []
-    for row in sorted(result.assumptions, key=_first_told):
+    for row in sorted(assumptions, key=_first_told):
         tone, mark, word = _OUTCOMES[row.status] if row.one_of is None else _ONE_OF
         value = None if row.measured is None else row.measured.value
         rows.append((
             Cell(word, None, tone, mark),
-            Cell(f"{row.stage} \u00b7 {row.role}"),
-            Cell(row.assumption.replace("_", " ")),
+            Cell(f"{row.stage} \u00b7 {row.role}: {row.assumption.replace('_', ' ')}"),
             Cell(_figure(row.assumed, row.unit), row.assumed),
             Cell(_measured(row), value),
             Cell(row.evidence),
         ))  # fmt: skip
     heads = (
         "Status",
-        "Where",
         "Assumption",
         "Assumed #",
         "Measured (95 %) #",
         "Evidence",
     )
-    return table("Assumptions", heads, rows, named_by=2)
+    return table("Assumptions", heads, rows, named_by=1)
 
 
 def _first_told(row: AssumptionResult) -> tuple[int, int]:

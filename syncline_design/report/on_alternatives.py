@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from syncline_design.report import numbers
 from syncline_design.report.document import Items, Node
+from syncline_design.report.numbers import MISSING
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.verdict.named import Alternative, Bargain, RankedDesign, StampingRange
 
@@ -25,7 +26,14 @@ def _row(
 ) -> tuple[Cell | str, ...]:  # fmt: skip
     name = Cell(f"{one.sensor} ({', '.join(one.places)})")
     if one.verdict == "infeasible":
-        return name, "\u2013", "\u2013", "\u2013", "\u2013", "no design meets the requirements"
+        return (
+            name,
+            MISSING,
+            MISSING,
+            MISSING,
+            MISSING,
+            "no design meets the requirements",
+        )
     left_open = " (left open by the simulation)" if one.verdict == "indeterminate" else ""
     return (
         name, _money(one.cost, currency), _money(one.dearer_by, currency),

@@ -61,10 +61,10 @@ def on_diff(data: Diff) -> Document:
             ("Now", _outcome(data, "new").word),
         ),
         sections=(
+            *section("margins", "Requirements", show(_margins(data), silent=True)),
             *section("causes", "What differs", causes),
             *section("payload", "Payload", show(_payload(data), silent=True)),
             *section("sums", "Sums", show(_sums(data), silent=True)),
-            *section("margins", "Requirements", show(_margins(data), silent=True)),
             *provenance(_provenance(data)),
         ),
     )

@@ -176,8 +176,8 @@ def finding_node(found: Finding, drive: NextDrive | None = None, *, first: bool 
         Heading(given(spaced(found.effect)), given(f"{found.sensor}, {found.stage}")),
         Text(full_stop(called(found)), reach="page"),
         Facts(tuple(facts)),
-        Text(numbers.unbroken(f"Evidence: {full_stop(found.evidence)}")),
-        *([Text(numbers.unbroken(NAT), quiet=True)] if first and " nat" in found.evidence else []),
+        Text(f"Evidence: {full_stop(found.evidence)}"),
+        *([Text(NAT, quiet=True)] if first and " nat" in found.evidence else []),
         *scope_nodes(found),
     ]
     if found.varying:

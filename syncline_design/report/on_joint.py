@@ -29,7 +29,8 @@ def scope_nodes(found: Finding) -> list[Node]:
     words = SCOPES[found.scope]
     if found.one_value is not None:
         words += f" {_tested(found)}"
-    nodes: list[Node] = [Text(words), *_by_log(found)]
+    drawn = _by_log(found)
+    nodes: list[Node] = [Text(words), *drawn]
     if found.per_log and any(one.parameters for one in found.per_log):
         names = list(found.per_log[0].parameters)
         columns = [_column([one.parameters[n] for one in found.per_log]) for n in names]
@@ -39,7 +40,8 @@ def scope_nodes(found: Finding) -> list[Node]:
         ]
         heads = ("Log", "File", *(f"{split_suffix(name)[0].replace('_', ' ')} #" for name in names))
         called = found.effect.replace("_", " ")
-        nodes += show(table(f"{called} ({found.sensor}) in each log", heads, rows))
+        shown = table(f"{called} ({found.sensor}) in each log", heads, rows)
+        nodes += show(shown, reach="text" if drawn else "everywhere")  # the figure has its values
     elif found.per_log:
         nodes.append(Text(f"In {', '.join(one.file for one in found.per_log)}."))
     return nodes

@@ -20,6 +20,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.numbers import MISSING
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, Tone, table
 
@@ -112,9 +113,9 @@ def _streams(result: LogInspection) -> Table | None:
     rows = [
         (
             Cell(one.name, code=True, sub=one.file.rpartition("/")[2] if several else ""),
-            Cell(", ".join(one.quantity) or "\u2013", sub=one.kind),
+            Cell(", ".join(one.quantity) or MISSING, sub=one.kind),
             Cell(numbers.count(one.messages), float(one.messages)),
-            Cell("\u2013" if one.rate_hz is None else numbers.number(one.rate_hz), one.rate_hz),
+            Cell(MISSING if one.rate_hz is None else numbers.number(one.rate_hz), one.rate_hz),
             Cell(_moment(one, "first")),
             Cell(_moment(one, "last")),
             Cell(one.timeline, sub=_times(one)),
@@ -135,9 +136,9 @@ def _arms(result: LogInspection) -> Table | None:
         (
             Cell(one.frame, code=True, sub=f"in {one.body}"),
             Cell(_place(one.log_m)),
-            Cell(one.role or "\u2013"),
-            Cell("\u2013" if one.spec_m is None else _place(one.spec_m)),
-            Cell("\u2013" if one.apart_m is None else numbers.length(one.apart_m), one.apart_m,
+            Cell(one.role or MISSING),
+            Cell(MISSING if one.spec_m is None else _place(one.spec_m)),
+            Cell(MISSING if one.apart_m is None else numbers.length(one.apart_m), one.apart_m,
                  "" if one.agrees else "warn", "" if one.agrees else "!"),
         )
         for one in result.lever_arms
@@ -155,7 +156,7 @@ def _moment(one: InspectedStream, end: str) -> str:
     seconds = one.first if end == "first" else one.last
     if dated is not None:
         return dated[:-3]
-    return "\u2013" if seconds is None else f"{numbers.places(seconds, 6)} s"
+    return MISSING if seconds is None else f"{numbers.places(seconds, 6)} s"
 
 
 def _times(one: InspectedStream) -> str:

@@ -204,8 +204,8 @@ def _column_sizes(found: Plan) -> dict[str, float]:
 def _legs(found: Plan) -> list[Node]:
     several = len({leg.stage for leg in found.legs}) > 1
     rows = [
-        (leg.name, f"{_clock(leg.from_s)} to {_clock(leg.to_s)}", f"{leg.heading_deg:03.0f}\u00b0",
-         *([leg.stage] if several else []), leg.words)
+        (leg.name, numbers.typeset(f"{_clock(leg.from_s)} to {_clock(leg.to_s)}"),
+         f"{leg.heading_deg:03.0f}\u00b0", *([leg.stage] if several else []), leg.words)
         for leg in found.legs
     ]  # fmt: skip
     heads = ("Leg", "From, to", "Heading", *(["Stage"] if several else []), "What to do")

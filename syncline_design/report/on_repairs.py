@@ -43,5 +43,5 @@ def _row(one: Repair, limit: numbers.Limited | None) -> tuple[Cell | str, ...]:
         Cell(numbers.error(one.error_m, limit), one.error_m),
         Cell(word.word + missed, tone=word.tone, mark=word.mark),
         "; ".join(step.text for step in one.steps),
-        numbers.unbroken("; ".join(dict.fromkeys(s.assumes for s in one.steps if s.assumes))),
+        "; ".join(dict.fromkeys(s.assumes for s in one.steps if s.assumes)),
     )

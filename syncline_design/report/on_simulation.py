@@ -165,7 +165,7 @@ def _shares(row: ComparisonRow) -> str:
     _, _, told = row.reason.partition(": ")
     for cause in row.causes:
         told = told.replace(CAUSES[cause], _NAMES[cause])
-    return numbers.unbroken(told)
+    return told
 
 
 def _meanings(grid: tuple[ComparisonRow, ...]) -> str:

@@ -210,7 +210,7 @@ def _spec(result: TimingAndSpec) -> list[Node]:
     if means.asked_coverage is not None:
         asked, share = means.asked_coverage, result.claim.coverage
         nodes.append(Text(
-            f"The bound is claimed {numbers.unbroken(coverage_words(share, asked))}: measure with "
+            f"The bound is claimed {coverage_words(share, asked)}: measure with "
             f"`--coverage {numbers.number(asked, 4)}`.",
             mark="!", tone="warn",
         ))  # fmt: skip

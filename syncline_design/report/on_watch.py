@@ -26,6 +26,7 @@ from syncline_design.report.document import (
     Text,
     code,
     given,
+    pins,
     provenance,
     section,
 )
@@ -242,5 +243,8 @@ def _rests(found: Watch) -> list[Node]:
 
 def _provenance(found: Watch) -> list[tuple[str, str]]:
     own = found.provenance
-    return [("Version", own.version), ("Spec", own.spec_sha256), ("Catalogs", own.catalogs_sha256),
-            ("Store", found.last)]  # fmt: skip
+    return [
+        ("Spec file", found.spec.file),
+        *pins(own.version, own.spec_sha256, own.catalogs_sha256, None),
+        ("Last line of the store, SHA-256", found.last),
+    ]

@@ -11,11 +11,11 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
-from syncline_design.report.columns import padded
-from syncline_design.report.document import Document, charts, for_output, spans
+from syncline_design.report.columns import padded, worded
+from syncline_design.report.document import Document, Inline, Span, charts, for_output, spans
 from syncline_design.report.layout import laid_out
 from syncline_design.report.table import Table, table
-from syncline_design.report.text import unticked, visible
+from syncline_design.report.text import unbroken, unticked, visible
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -27,6 +27,8 @@ MOST_VALUES: Final = 200  # rows of the table below a figure; more are shown one
 _LINE: Final = 30  # characters of a column that holds sentences
 _TABLET: Final = 92  # characters in a line of a table there
 _PHONE: Final = 48
+_NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
+_MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 
 
@@ -90,17 +92,40 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["spans"] = spans
+    environment.filters["spans"] = _spans
     environment.filters["bare"] = unticked
     environment.tests["wide"] = lambda shown: _needed(shown) > _TABLET
     environment.tests["narrow"] = lambda shown: _needed(shown) <= _PHONE
     environment.tests["wordy"] = _is_wordy
+    environment.filters["whole"] = _whole
     environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
     environment.filters["points"] = _points
     environment.filters["values"] = _values
     environment.filters["drawing"] = Markup  # matplotlib has escaped the texts in it
     return environment
+
+
+def _spans(words: Inline) -> tuple[Span, ...]:
+    """Inline text in which, outside of code, figures are typeset."""
+    return tuple(
+        one if one.style == "code" else replace(one, text=_printed(one.text))
+        for one in spans(words)
+    )
+
+
+def _printed(text: str) -> str:
+    """A text whose figures stay with their units, with a minus where a hyphen was typed."""
+    return unbroken(_MINUS.sub("\N{MINUS SIGN}", text))
+
+
+def _whole(text: str) -> Any:
+    """A text in which no line ends at the hyphen of `ACC-1` or `1e-3`."""
+    from markupsafe import Markup, escape
+
+    parts = [escape(part) for part in _NAME.split(visible(text))]
+    parts[1::2] = [Markup('<span class="whole">{}</span>').format(part) for part in parts[1::2]]
+    return Markup("").join(parts)
 
 
 def _points(figure: InlineChart) -> str:
@@ -112,7 +137,7 @@ def _points(figure: InlineChart) -> str:
     rows = []
     for t in figure.told:
         said = (t.says.get(label, "") for label in labels)
-        found = [words.setdefault(word, len(words)) for word in said]
+        found = [words.setdefault(_printed(word), len(words)) for word in said]
         rows.append([t.left, t.top, t.wide, t.high, *found])
     data = {"labels": labels, "words": list(words), "rows": rows}
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
@@ -123,7 +148,7 @@ def _values(figure: InlineChart, caption: str) -> Table | None:
     if not 0 < len(figure.told) <= MOST_VALUES:
         return None
     labels = sorted(_labels(figure), key=lambda one: any(one not in t.says for t in figure.told))
-    columns = [padded([t.says.get(label, "") for t in figure.told]) for label in labels]
+    columns = [worded(padded([t.says.get(label, "") for t in figure.told])) for label in labels]
     return table(caption, labels, zip(*columns, strict=True))
 
 
@@ -154,6 +179,6 @@ def _soft(text: str) -> str:
 
 def _breakable(text: str) -> Any:
     """A key path that may go on in the next line before each of its dots and brackets."""
-    from markupsafe import Markup, escape
+    from markupsafe import Markup
 
-    return Markup("<wbr>").join(escape(part) for part in _STEP.split(visible(text)))
+    return Markup("<wbr>").join(_whole(part) for part in _STEP.split(visible(text)))

@@ -43,7 +43,7 @@ _STYLE: Final[dict[str, Any]] = {
     "axes.edgecolor": MUTED,
     "axes.labelcolor": INK,
     "axes.linewidth": 0.8,
-    "axes.unicode_minus": False,
+    "axes.unicode_minus": True,
     "text.color": INK,
     "text.parse_math": False,
     "xtick.color": MUTED,

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+from typing import Final
+
+from syncline_design.model.unit_table import UNITS
 
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 _CONTROL_PICTURES = 0x2400  # U+2400..U+241F picture the C0 controls, U+2421 pictures DEL
@@ -11,7 +14,12 @@ _DIRECTION_OR_BREAK = {
     *range(0x202A, 0x202F), *range(0x2066, 0x206A), 0xFEFF,
 }  # fmt: skip
 _SPREADSHEET_FORMULA = ("=", "+", "-", "@", "\t", "\r")
-_MICRO = re.compile(r"(?<=\d) u(?=[smW]\b)")
+_MICRO = re.compile(r"(?<=\d) u(?=(?:[smW]|rad)\b)")
+# besides those of specs: as pages print them, and of figures that no spec states
+_BESIDE: Final = ("m/s\N{SUPERSCRIPT TWO}", "deg/s\N{SUPERSCRIPT TWO}", "m/(m/s2)", "mm/(m/s2)",
+                  "nat", "\N{GREEK SMALL LETTER SIGMA}", "kB", "MB", "GB")  # fmt: skip
+_UNIT: Final = "|".join(map(re.escape, sorted((*UNITS, *_BESIDE), key=len, reverse=True)))
+_GAP: Final = re.compile(rf"(?<=\d) (?=\d{{3}}(?!\d)|(?:{_UNIT})(?!\w))")
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~^$])")
 
 
@@ -57,6 +65,11 @@ def ticked(text: str) -> list[str]:
 def unticked(text: str) -> str:
     """The same without its backticks, where nothing shows code in a style of its own."""
     return "".join(ticked(text))
+
+
+def unbroken(text: str) -> str:
+    """A text in which no line ends inside a figure, or between it and its unit."""
+    return _GAP.sub("\N{NO-BREAK SPACE}", text)
 
 
 def spreadsheet_safe(text: object) -> str:

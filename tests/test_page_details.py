@@ -1,0 +1,136 @@
+"""Small things of a page that a reader stumbles over: broken names, labels on lines, blanks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from browsing import Opened
+from html_page import Page
+from study_specs import write
+from syncline_design.comparison.acceptance import AssumptionResult
+from syncline_design.report.charts_plan import beside
+from syncline_design.report.document import Document, Outcome, Text, pins, section, show
+from syncline_design.report.on_acceptance import assumptions_table
+from syncline_design.report.render_html import html
+from syncline_design.report.studies import render_study
+from syncline_design.report.table import table
+from syncline_design.studies import StudySettings, run_study
+
+WIDE, PHONE = {"width": 1300, "height": 900}, {"width": 420, "height": 900}
+
+
+def page(*nodes: Any, sections: int = 1) -> str:
+    parts = [one for k in range(sections) for one in section(f"part-{k}", f"Part no {k}", nodes)]
+    return html(Document("x", Outcome("good", "+", "x"), "x", (), (), tuple(parts)))
+
+
+@pytest.mark.parametrize("name", ["ACC-1", "HDL-32E", "2026-11-22"])
+def test_no_line_ends_at_the_hyphen_of_a_name(name: str) -> None:
+    shown = page(Text(f"Of requirements[{name}].limit, {name} and a well-known 12."))
+    assert shown.count(f'<span class="whole">{name}</span>') == 2
+    assert f"Of requirements[{name}].limit, {name} and a well-known 12." in Page(shown).text
+
+
+@pytest.mark.parametrize(
+    ("typed", "printed"),
+    [("from -40.3 cm on", "from \u221240.3\u00a0cm on"), ("p = 3e-55", "p = 3e\u221255"),
+     ("(-1 to -0.5)", "(\u22121 to \u22120.5)"), ("on 2026-11-22", "on 2026-11-22"),
+     ("MRU-5 and 12-14", "MRU-5 and 12-14"), ("`--tilt -3 deg`", "--tilt -3 deg")],
+)  # fmt: skip
+def test_a_minus_is_printed_for_what_was_typed(typed: str, printed: str) -> None:
+    assert printed in Page(page(Text(typed))).text
+
+
+def test_every_assumption_is_headed_by_its_sensor() -> None:
+    """On a phone each row is a card, and its head says whose latency it is about."""
+    rows = [
+        AssumptionResult(stage, role, kind, 0.0, None, "s", "holds", "", 1, 1)
+        for stage in ("front", "rear")
+        for role in ("position", "attitude")
+        for kind in ("latency", "timing")
+    ]
+    shown = assumptions_table(rows)
+    named = [row[shown.named_by].text for row in shown.rows]
+    assert len(set(named)) == len(rows)
+    assert "rear \u00b7 attitude: latency" in named
+
+
+def test_the_label_of_a_leg_lies_beside_its_path() -> None:
+    """On a line and at a corner: about as far from all that is drawn as can be."""
+    line = np.c_[np.zeros(200), np.linspace(-10.0, 10.0, 200)]
+    corner = np.r_[line, np.c_[np.linspace(0.0, 10.0, 100), np.full(100, 10.0)]]
+    for drawn, at, least in ((line, (0.0, 0.0), 0.99), (corner, (0.0, 10.0), 0.9)):
+        x, y = beside(at, drawn, 1.0)
+        assert np.hypot(x - at[0], y - at[1]) == pytest.approx(1.0)
+        assert np.min(np.hypot(drawn[:, 0] - x, drawn[:, 1] - y)) > least
+
+
+def test_no_seed_where_nothing_is_drawn() -> None:
+    assert [label for label, _ in pins("1", "a", "b", None)] == [
+        "syncline-design", "Spec, SHA-256", "Catalogs, SHA-256",
+    ]  # fmt: skip
+    assert pins("1", "a", "b", 7)[-1] == ("Seed", "7")
+
+
+SAMPLE = """\
+study: 1
+name: Sample
+base: [spec.yaml]
+sample:
+  count: 20
+  seed: 3
+  over:
+    "stages[uav].distance": 30 m .. 140 m
+    "stages[uav].v_max": {low: 1 m/s, high: 60 m/s, scale: log}
+    "stages[uav].ranging.sensor": [velodyne_hdl32e, riegl_vux1uav]
+meets_when: decided
+"""
+
+
+@pytest.mark.browser
+def test_the_cases_of_a_sample_fill_the_card_beside_their_figure(
+    browser: Any, tmp_path: Path
+) -> None:
+    """As cards, each headed by its number; from its top to near the figure's foot."""
+    path = tmp_path / "page.html"
+    found = run_study(write(tmp_path, SAMPLE), StudySettings(workers=1))
+    path.write_text(str(render_study("html", found)), "utf-8")
+    box = "e => { const b = e.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }"
+    with Opened(browser, path, viewport=WIDE) as opened:
+        figure, values = (
+            opened.page.eval_on_selector(f"#sampled {part}", box)
+            for part in (".drawing", ".values .inner")
+        )
+        head = "e => getComputedStyle(e, '::before').content + e.innerText.trim()"
+        assert opened.page.eval_on_selector("#sampled tbody th", head) == '"Case\u00a0"1'
+    assert values[0] > figure[2]
+    assert values[3] - figure[1] > 0.7 * (figure[3] - figure[1])
+
+
+@pytest.mark.browser
+def test_a_list_of_sections_says_that_it_goes_on(browser: Any, tmp_path: Path) -> None:
+    """Until its end is in sight; not where all of it is."""
+    path = tmp_path / "page.html"
+    path.write_text(page(Text("x"), sections=9), "utf-8")
+    hint = "() => getComputedStyle(document.querySelector('nav'), '::after').content"
+    with Opened(browser, path, viewport=PHONE) as opened:
+        assert opened.page.evaluate(hint) == '"\u203a"'
+        opened.page.evaluate("() => { document.querySelector('nav ul').scrollLeft = 9999; }")
+        opened.page.wait_for_function(f"({hint})() === 'none'")
+        opened.page.set_viewport_size(WIDE)
+        opened.page.wait_for_function(f"({hint})() === 'none'")
+
+
+@pytest.mark.browser
+def test_short_names_and_states_stand_on_one_line(browser: Any, tmp_path: Path) -> None:
+    """Beside a column of sentences, which takes what it can get."""
+    path = tmp_path / "page.html"
+    rows = [["uav \u00b7 attitude", "x", "y", "z", "a long reason " * 12] for _ in range(26)]
+    path.write_text(page(*show(table("x", ("Role", "A", "B", "C", "Why"), rows))), "utf-8")
+    high = "e => e.getClientRects().length && e.querySelector('bdi').getClientRects().length"
+    with Opened(browser, path, viewport=WIDE) as opened:
+        assert opened.page.eval_on_selector("tbody th", high) == 1
