@@ -13,10 +13,17 @@ import pytest
 
 from random_problems import random_problem, with_random_limits
 from syncline_design.choice import platform_fixes as fixes_of_platforms
-from syncline_design.choice.core import Beside, best_from
+from syncline_design.choice.core import Beside, best_from, best_with
 from syncline_design.choice.decide import choose
 from syncline_design.choice.enumerate import all_designs, best_by_enumeration
-from syncline_design.choice.evaluate import broken
+from syncline_design.choice.evaluate import (
+    Incumbent,
+    broken,
+    chosen_options,
+    evaluate,
+    rank,
+)
+from syncline_design.choice.holding import without
 from syncline_design.choice.outcome import Choice, Deadline
 from syncline_design.choice.parts import Existence, is_feasible
 from syncline_design.choice.platform_fixes import platform_fixes
@@ -35,6 +42,8 @@ from syncline_design.choice.what_if import (
     Moving,
     of_method,
     of_sensor,
+    same_design,
+    same_places,
     with_method_tau,
     with_sensor_error,
 )
@@ -91,6 +100,57 @@ def test_a_changed_column_is_a_changed_option(seed: int) -> None:
     assert _names(changed, best_from(changed, at_hand, beside)) == _names(
         anew, best_by_enumeration(anew, Deadline())
     )
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_best_with_another_option_or_near_a_design_that_fails(seed: int) -> None:
+    """What bounds leave of a changed problem holds its best design, by every design tried."""
+    rng = random.Random(seed)
+    problem = random_problem(rng, 20)
+    problem = with_random_limits(rng, problem, [e.error_m for _, e in all_designs(problem)])
+    best = best_by_enumeration(problem, Deadline())
+    if best is None:
+        return
+    beside, r = Beside(problem), rng.randrange(len(problem.roles))
+    place = rng.randrange(len(problem.roles[r].options))
+    rows = of_sensor(problem, r, place)
+    own = problem.roles[r].pool()[int(np.argmax(rows))].sensor
+    changed = with_sensor_error(problem, r, rows, Fraction(rng.randint(1, 64), 64))
+    plain = best_by_enumeration(changed, Deadline())
+    at_hand = same_design(problem, best, changed)
+    near = (tuple(same_places(problem, best, changed)), best)
+    assert best_from(changed, at_hand, beside, near) == plain
+    if own != problem.roles[r].options[best.options[r]].sensor:
+        assert at_hand is not None
+        known = Incumbent.of(changed, at_hand)
+        assert known is not None
+        options = changed.roles[r].options
+        with_it = best_with(
+            changed, known, r, options.sensor == rows_number(problem, r, own), beside
+        )
+        found = [at_hand] if with_it is None else [at_hand, with_it]
+        assert min(found, key=lambda d: rank(changed, d, evaluate(changed, d))) == plain
+
+
+def rows_number(problem, r: int, sensor: str) -> int:
+    pool = problem.roles[r].pool()
+    return next(int(n) for n, one in zip(pool.sensor, pool, strict=True) if one.sensor == sensor)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_best_without_a_sensor(seed: int) -> None:
+    """By what bounds leave near the chosen design, and by every design tried."""
+    rng = random.Random(seed)
+    problem = random_problem(rng, 20)
+    problem = with_random_limits(rng, problem, [e.error_m for _, e in all_designs(problem)])
+    best = best_by_enumeration(problem, Deadline())
+    if best is None:
+        return
+    for sensor in {option.sensor for option in chosen_options(problem, best)}:
+        whole, part = without(problem, sensor), without(problem, sensor, best)
+        plain = None if whole.is_empty else best_by_enumeration(whole.problem, Deadline())
+        found = None if part.is_empty else best_by_enumeration(part.problem, Deadline())
+        assert (found and part.whole(found)) == (plain and whole.whole(plain))
 
 
 def _figures(option) -> tuple:

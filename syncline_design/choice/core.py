@@ -18,10 +18,11 @@ from syncline_design.choice.narrowed import Narrowed, narrowed, whole_of
 from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, Options
 from syncline_design.choice.partition import best_of
 from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
-from syncline_design.choice.table import Design, Problem
+from syncline_design.choice.table import Design, Problem, is_empty
 from syncline_design.machine.deadline import in_force
 
 EXACT = 2**52  # sums of whole amounts below it are exact as floats
+MOST_TRIED = 12  # options of a role near a design that does not stand
 TIED = 1e-11  # errors of one order: 12 figures
 
 
@@ -123,8 +124,11 @@ def may_improve(
     return np.asarray(cheaper | (least + no_worse <= as_much))
 
 
-def core(problem: Problem, known: Incumbent, beside: Beside) -> Narrowed:
-    """The problem without the options that no design as good as a known one can have."""
+def core(problem: Problem, known: Incumbent, beside: Beside, *, held: bool = True) -> Narrowed:
+    """The problem without the options that no design as good as a known one can have.
+
+    held: whether the known design is one of the problem's own, and stays.
+    """
     every = range(len(problem.roles))
     rows: dict[int, Indices] = {}
     for r in sorted(every, key=lambda r: beside.has(problem, r)):  # what is new first
@@ -132,21 +136,82 @@ def core(problem: Problem, known: Incumbent, beside: Beside) -> Narrowed:
         options = problem.roles[r].options
         amount, total = beside.amounts(options), total_least(problem, r, options)
         keeps = may_improve(problem, known, amount, total, others, beside)
-        keeps[known.design.options[r]] = True
+        if held:
+            keeps[known.design.options[r]] = True
         rows[r] = np.flatnonzero(keeps)
+        if not len(rows[r]):
+            rows |= {q: np.zeros(0, dtype=np.intp) for q in every}
+            break
     return narrowed(problem, [rows[r] for r in every], _every_clock(problem))
 
 
-def best_from(problem: Problem, design: Design | None, beside: Beside) -> Design | None:
-    """The best design in the documented order, starting from one that is at hand."""
+def best_with(
+    problem: Problem, known: Incumbent, r: int, rows: Bools, beside: Beside
+) -> Design | None:
+    """The best design with one of these options in a role; None where none is as good as a known
+    one without them."""
+    every = [np.arange(len(table.options)) for table in problem.roles]
+    every[r] = np.flatnonzero(rows)
+    if not len(every[r]):
+        return None
+    part = narrowed(problem, every, _every_clock(problem))
+    fewer = core(part.problem, known, beside, held=False)
+    if fewer.is_empty:
+        return None
+    places = tuple(own[kept] for own, kept in zip(part.options, fewer.options, strict=True))
+    return best_of(Narrowed(fewer.problem, places, part.clocks), in_force(), known)
+
+
+Places = Sequence[int | None]  # of a design's options in another problem; None: gone
+
+
+def best_from(
+    problem: Problem,
+    design: Design | None,
+    beside: Beside,
+    near: tuple[Places, Design] | None = None,
+) -> Design | None:
+    """The best design in the documented order, starting from one that is at hand.
+
+    near: places of a design's options, where it does not stand itself, and the design.
+    """
     in_force().check()
     known = None if design is None else Incumbent.of(problem, design)
+    if known is None and near is not None:
+        known = standing_near(problem, *near)
     if known is None:
         return best_of(whole_of(problem), in_force())
     left = core(problem, known, beside)
     if left.problem.combinations == 1:
         return known.design
     return best_of(left, in_force(), known)
+
+
+def standing_near(problem: Problem, places: Places, design: Design) -> Incumbent | None:
+    """A design that meets every requirement, with another option in one role; cheapest such."""
+    gone = [r for r, place in enumerate(places) if place is None]
+    if len(gone) > 1 or problem.objective == "error" or is_empty(problem):
+        return None
+    found = [_other_in(problem, places, design, r) for r in gone or range(len(places))]
+    known = [one for one in found if one is not None and one.amount < math.inf]
+    return min(known, key=lambda one: one.amount, default=None)
+
+
+def _other_in(problem: Problem, places: Places, design: Design, r: int) -> Incumbent | None:
+    """The cheapest of the first few options of a role with which a design stands."""
+    options, rest = problem.roles[r].options, 0.0
+    for q, (table, place) in enumerate(zip(problem.roles, places, strict=True)):
+        if q != r and place is not None:
+            rest += float(table.options.added[place])
+    least, limit = total_least(problem, r, options), problem.limits.accuracy_m
+    fits = np.flatnonzero(least + rest <= (math.inf if limit is None else limit))
+    amount = options.spent(resource_of(problem)).whole[fits].astype(np.float64)
+    for row in fits[np.lexsort((least[fits], amount))][:MOST_TRIED].tolist():
+        taken = tuple(row if q == r else int(place or 0) for q, place in enumerate(places))
+        known = Incumbent.of(problem, Design(taken, design.clocks))
+        if known is not None:
+            return known
+    return None
 
 
 def _every_clock(problem: Problem) -> list[range]:

@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from syncline_design.choice.core import Beside, core, standing_near
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import evaluate, rank
 from syncline_design.choice.exclusions import Exclusions
@@ -86,9 +87,27 @@ def best_with(problem: Problem, kind: EntryKind, identity: str) -> Design | None
     return min(ranked)[2] if ranked else None
 
 
-def without(problem: Problem, sensor: str) -> Narrowed:
-    """The designs with this sensor in no role."""
-    return kept(problem, lambda _, options: ~hold(options, "sensor", sensor), lambda _, clock: True)
+def without(problem: Problem, sensor: str, chosen: Design | None = None) -> Narrowed:
+    """The designs with this sensor in no role.
+
+    chosen: the best design, where only what is as good as another one near it needs to be kept.
+    """
+    part = kept(problem, lambda _, options: ~hold(options, "sensor", sensor), lambda _, clock: True)
+    if chosen is None or part.is_empty or problem.judge is not None:
+        return part
+    known = standing_near(part.problem, tuple(_left_of(part, chosen)), chosen)
+    if known is None:
+        return part
+    fewer = core(part.problem, known, Beside(part.problem))
+    places = tuple(own[rows] for own, rows in zip(part.options, fewer.options, strict=True))
+    return Narrowed(fewer.problem, places, part.clocks)
+
+
+def _left_of(part: Narrowed, design: Design) -> Iterator[int | None]:
+    """Where a part has the options of a design; None where it has not."""
+    for own, place in zip(part.options, design.options, strict=True):
+        found = np.flatnonzero(own == place)
+        yield int(found[0]) if len(found) else None
 
 
 def hold(options: Options, kind: EntryKind, identity: str) -> Bools:
@@ -100,11 +119,9 @@ def hold(options: Options, kind: EntryKind, identity: str) -> Bools:
         return np.zeros(len(options), dtype=bool)
     numbers = options.sensor if kind == "sensor" else options.method
     _, first = np.unique(numbers, return_index=True)
-    named = [
-        place
-        for place in first.tolist()
-        if (options[place].sensor if kind == "sensor" else options[place].method) == identity
-    ]
+    names = options.take(first).all_names()
+    own = 0 if kind == "sensor" else 2
+    named = [place for place, one in zip(first, names, strict=True) if one[own] == identity]
     return np.isin(numbers, numbers[named])
 
 

@@ -216,6 +216,11 @@ class Options(Sequence[Option]):
         _, first = np.unique(numbers, return_index=True)
         return tuple(self[place] for place in np.sort(first).tolist())
 
+    def names_of_each(self, numbers: Indices) -> list[Names]:
+        """The names of the first option of each sensor, or of each method."""
+        _, first = np.unique(numbers, return_index=True)
+        return self.take(np.sort(first)).all_names()
+
     def take(self, rows: Indices | Bools | Sequence[int]) -> Options:
         """Some of the options."""
         chosen = np.asarray(rows) if len(rows) else np.zeros(0, dtype=np.intp)

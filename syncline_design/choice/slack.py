@@ -42,6 +42,7 @@ from syncline_design.choice.what_if import (
     of_sensor,
     platform_what_if,
     same_design,
+    same_places,
     with_method_tau,
     with_sensor_error,
 )
@@ -286,7 +287,7 @@ def _with_payload(row: Slack, asked: _Asked, growing: Growing, *, fails_never: b
         own = same_design(problem, design, other)
         if other.judge is not None and own is not None and not _stands(other, own):
             return False  # without simulating every other design
-        found = _chosen(other, own, asked.beside)
+        found = _chosen(asked, other, own)
         return found is not None and payload(other, found) == now
 
     if problem.judge is None:
@@ -350,11 +351,12 @@ def _simulated(
     return replace(row, fails_at=at, limited_by=kinds.get(breaks, SIMULATED))
 
 
-def _chosen(problem: Problem, at_hand: Design | None, beside: Beside) -> Design | None:
+def _chosen(asked: _Asked, other: Problem, at_hand: Design | None) -> Design | None:
     """The choice of a changed problem; None where nothing meets it."""
-    if problem.judge is None:
-        return best_from(problem, at_hand, beside)
-    found = choose(problem, "front")
+    if other.judge is None:
+        near = (tuple(same_places(asked.problem, asked.design, other)), asked.design)
+        return best_from(other, at_hand, asked.beside, near)
+    found = choose(other, "front")
     return found.design if isinstance(found, Choice) else None
 
 

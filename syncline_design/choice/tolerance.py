@@ -11,12 +11,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Literal
 
-from syncline_design.choice.core import Beside, best_from
+import numpy as np
+
+from syncline_design.choice.core import Beside, best_from, best_with
 from syncline_design.choice.decide import choose
-from syncline_design.choice.evaluate import Incumbent, broken, chosen_options, evaluate
+from syncline_design.choice.evaluate import Incumbent, broken, chosen_options, evaluate, rank
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
@@ -34,6 +37,7 @@ from syncline_design.choice.what_if import (
     Numbers,
     numbers_of,
     same_design,
+    same_places,
     sensors_that_matter,
     with_sheet_figure,
 )
@@ -273,7 +277,7 @@ class _Asked:
     """A design whose figures may be other than written.
 
     beside: None where a figure changes more than its sensor's columns (known effects, simulation);
-    then every problem is built anew.
+    then every problem is built anew.  best: the design where it is known to be the best of all.
     """
 
     case: Case
@@ -282,12 +286,16 @@ class _Asked:
     build: Build
     numbers: Numbers
     beside: Beside | None
+    best: Incumbent | None = None
 
     @classmethod
     def of(cls, case: Case, problem: Problem, design: Design, build: Build) -> _Asked:
         plain = not case.effects and problem.judge is None
         beside = Beside(problem) if plain else None
-        return cls(case, problem, design, build, numbers_of(case, problem), beside)
+        best = None
+        if beside is not None and best_from(problem, design, beside) == design:
+            best = Incumbent.of(problem, design)
+        return cls(case, problem, design, build, numbers_of(case, problem), beside, best)
 
     def worth_trying(self, figures: Sequence[tuple[SheetFigure, Ends]]) -> list[SheetFigure]:
         """The figures without those that cannot change the choice."""
@@ -307,10 +315,30 @@ class _Asked:
         if self.beside is not None:
             other = with_sheet_figure(self.case, self.problem, self.numbers, figure, value)
             at_hand = same_design(self.problem, self.design, other)
-            return other, best_from(other, at_hand, self.beside)
+            return other, self._best(figure, other, at_hand)
         other = self.build(with_figure(self.case, figure, value))
         found = choose(other, "front")
         return other, found.design if isinstance(found, Choice) else None
+
+    def _best(self, figure: SheetFigure, other: Problem, at_hand: Design | None) -> Design | None:
+        """The best design where a sensor is another one.
+
+        Where that sensor is in one role alone, and not in the best design, that is still the best
+        of those without it: then only designs with it are looked at.
+        """
+        assert self.beside is not None
+        pairs = enumerate(zip(self.problem.roles, other.roles, strict=True))
+        moved = [r for r, (before, after) in pairs if after is not before]
+        if self.best is not None and at_hand is not None and len(moved) == 1:
+            number, options = self.numbers[moved[0]][figure.sensor], other.roles[moved[0]].options
+            rows = np.asarray(options.sensor == number)
+            if not rows[at_hand.options[moved[0]]]:
+                known = replace(self.best, design=at_hand)
+                with_it = best_with(other, known, moved[0], rows, self.beside)
+                both = [at_hand] if with_it is None else [at_hand, with_it]
+                return min(both, key=lambda one: rank(other, one, evaluate(other, one)))
+        near = (tuple(same_places(self.problem, self.design, other)), self.design)
+        return best_from(other, at_hand, self.beside, near)
 
 
 def weight(one: Measurement) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
 
@@ -36,12 +36,17 @@ from syncline_design.spec.catalog import SensorEntry
 def same_design(problem: Problem, design: Design, other: Problem) -> Design | None:
     """The design of the same names in another problem; None where an option is gone."""
     places = []
-    for own, table, place in zip(problem.roles, other.roles, design.options, strict=True):
-        found = table.options.place_like(own.options, place)
-        if found is None:
+    for place in same_places(problem, design, other):
+        if place is None:
             return None
-        places.append(found)
+        places.append(place)
     return Design(tuple(places), design.clocks)
+
+
+def same_places(problem: Problem, design: Design, other: Problem) -> Iterator[int | None]:
+    """Where another problem has the options of the same names; None where one is gone."""
+    for own, table, place in zip(problem.roles, other.roles, design.options, strict=True):
+        yield table.options.place_like(own.options, place)
 
 
 def of_sensor(problem: Problem, r: int, place: int) -> Bools:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 from typing import Literal
 
 from syncline_design.choice.evaluate import chosen_options, evaluate
@@ -41,7 +43,7 @@ def _choices(problem: Problem) -> dict[str, int]:
 def _without(
     case: Case, problem: Problem, chosen: Design, sensor: str, places: tuple[str, ...]
 ) -> Alternative:
-    part = without(problem, sensor)
+    part = without(problem, sensor, chosen)
     found = outcome_of(part.problem)
     if isinstance(found, Infeasible):
         return Alternative(sensor, places, "infeasible", None, None, None, None, (), None)
@@ -80,7 +82,7 @@ def bargains(
     limit = problem.limits.accuracy_m
     allowed = sums.error_m if limit is None or problem.objective == "error" else limit
     known = [
-        (Fraction(p.amount), p.error_m, full_design(case, problem, p.design))
+        (Fraction(p.amount), p.error_m, partial(full_design, case, problem, p.design))
         for p in points
         if not p.undecided
     ]
@@ -88,18 +90,19 @@ def bargains(
 
 
 def worth_it(
-    known: Sequence[tuple[Fraction, float, NamedDesign]],
+    known: Sequence[tuple[Fraction, float, Callable[[], NamedDesign]]],
     cost: Fraction,
     error: float,
     allowed: float,
 ) -> Iterator[Bargain]:
-    """Bargains among points of a front (amount, error, design), seen from a design.
+    """Bargains among points of a front (amount, error, what names it), seen from a design.
 
     allowed: the error that it may have, where it is the price that is least.
     """
     paid = float(cost) or min((float(amount) for amount, *_ in known if amount > 0), default=0.0)
-    found: list[tuple[float, Bargain]] = []
-    for amount, reached, shown in known:
+    found: dict[Literal["better", "cheaper"], list[tuple[float, int, float, float]]]
+    found = {"better": [], "cheaper": []}
+    for place, (amount, reached, _) in enumerate(known):
         extra = float(amount - cost)
         kind: Literal["better", "cheaper"]
         if extra > 0.0 and reached < error:
@@ -109,8 +112,9 @@ def worth_it(
         else:
             continue
         if gain >= LEAST_GAIN and gain >= LEAST_RATIO * pain:
-            one = Bargain(kind, extra, float(amount), start, reached, shown)
-            found.append((gain / pain if pain else float("inf"), one))
-    found.sort(key=lambda pair: -pair[0])
-    for kind in ("better", "cheaper"):
-        yield from [one for _, one in found if one.kind == kind][:MOST_BARGAINS]
+            found[kind].append((gain / pain if pain else math.inf, place, extra, start))
+    for kind, those in found.items():
+        those.sort(key=lambda one: -one[0])
+        for _, place, extra, start in those[:MOST_BARGAINS]:
+            amount, reached, named = known[place]
+            yield Bargain(kind, extra, float(amount), start, reached, named())

@@ -173,8 +173,9 @@ def left_out(case: Case, problem: Problem, resource: ResourceName) -> tuple[str,
     usable = {f"clock {clock.id}" for vehicle in problem.vehicles for clock in vehicle.clocks}
     usable |= {f"shared hardware {item.id}" for item in problem.infrastructure}
     for options in (table.options for table in problem.roles):
-        usable |= {f"sensor {one.sensor}" for one in options.first_of_each(options.sensor)}
-        usable |= {f"timestamping method {o.method}" for o in options.first_of_each(options.method)}
+        sensors, methods = (options.names_of_each(n) for n in (options.sensor, options.method))
+        usable |= {f"sensor {sensor}" for sensor, _, _ in sensors}
+        usable |= {f"timestamping method {method}" for _, _, method in methods}
     return tuple(
         label
         for _, label, entry in parts_in_use(case)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 
 from syncline_design.choice.family import Family, FamilyDesign, broken_by_family, evaluate_family
 from syncline_design.choice.family_best import FamilyPoint, SummedDesign, iter_differing
@@ -22,7 +23,13 @@ from syncline_design.verdict.family import (
     passing,
 )
 from syncline_design.verdict.family_named import front_design, ranked
-from syncline_design.verdict.named import Alternative, Bargain, RankedDesign, StampingRange
+from syncline_design.verdict.named import (
+    Alternative,
+    Bargain,
+    NamedDesign,
+    RankedDesign,
+    StampingRange,
+)
 
 MOST_COMBINED = 1_000  # ways of stamping the same sensors that are looked at, each exactly
 
@@ -159,9 +166,11 @@ def bargains(work: Work, chosen: Chosen, points: Sequence[FamilyPoint]) -> Itera
     one = next(iter(limits))
     allowed = sums.error_m if one is None or work.family.objective == "error" else one
     cheaper = [p for p in points if p.amount < sums.cost] if len(limits) == 1 else []
-    every = [
-        (Fraction(p.amount), p.error_m, front_design(work, p).design) for p in (*cheaper, *better)
-    ]
+
+    def named(point: FamilyPoint) -> NamedDesign:
+        return front_design(work, point).design
+
+    every = [(Fraction(p.amount), p.error_m, partial(named, p)) for p in (*cheaper, *better)]
     yield from worth_it(every, sums.cost, sums.error_m, allowed)
 
 
