@@ -37,6 +37,7 @@ def on_one_timeline(several: Sequence[StreamValues], choice: LogChoice) -> bool:
     Streams that all count from the same unknown zero stay as they are.
     """
     timelines = {id(one): _timeline(one, choice) for one in several}
+    _boots_that_tell_utc(several, timelines)
     _with_weeks(several, timelines, choice)
     calendars = [one for one in several if timelines[id(one)] in CALENDARS]
     others = [one for one in several if timelines[id(one)] not in CALENDARS]
@@ -58,6 +59,19 @@ def on_one_timeline(several: Sequence[StreamValues], choice: LogChoice) -> bool:
     for one in calendars:
         _as_utc(one, timelines[id(one)])
     return True
+
+
+def _boots_that_tell_utc(several: Sequence[StreamValues], timelines: dict[int, Timeline]) -> None:
+    """Boots of files beside others are made UTC where they tell it: no other counts from them."""
+    if len({id(one.offer.recording) for one in several}) < 2:
+        return
+    booted = [one for one in several if timelines[id(one)] == "boot"]
+    pairs = {id(one.offer.recording): _boot_pairs(one, several) for one in booted}
+    for one in booted:
+        apart = pairs[id(one.offer.recording)]
+        if np.count_nonzero(apart > EARLIEST_NS) >= LEAST_PAIRS:
+            _booted(one, apart)
+            timelines[id(one)] = "utc"
 
 
 def _timeline(one: StreamValues, choice: LogChoice) -> Timeline:
