@@ -69,6 +69,44 @@ def test_ticks_that_a_whole_interval_hides_are_said_and_counted(
     assert row.residual_s.bound == pytest.approx(np.ptp(receive - stamp) + tick, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("rate", "tick", "ppm"),
+    [(62.5, 4e-3, -45.0), (62.5, 2e-3, 35.0), (100.0, 1e-3, -45.0), (25.0, 4e-3, 40.0)],
+)
+def test_one_edge_of_a_tick_tells_its_length(
+    tmp_path: Path, rate: float, tick: float, ppm: float
+) -> None:
+    """The sensor drifts over one edge: stamps move on by one tick and stay, so that no longer one
+    held them back, though the interval is a whole number of such."""
+    rng = np.random.default_rng(33)
+    t = np.arange(round(60.0 * rate)) / rate * (1 + ppm * 1e-6)
+    at = 0.5 * (t[-1] - t[0]) * ppm * 1e-6  # the edge that it drifts over at half of the log
+    stamp = np.ceil((t - at) / tick - 1e-3) * tick + 5e-6 + rng.exponential(2e-5, t.size)
+    receive = recorded(stamp, rng)
+    assert 1 <= np.unique(np.round(np.diff(stamp) / tick)).size - 1 <= 2
+    row = said(tmp_path, stamp, receive)
+    assert not found(row)
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - stamp) + tick, abs=1e-6)
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.12)
+
+
+@pytest.mark.parametrize(("rate", "tick", "ppm"), [(200.0, 2e-3, -20.0), (40.0, 2e-3, 12.0)])
+def test_the_bound_counts_what_frames_hide_between_their_places(
+    tmp_path: Path, rate: float, tick: float, ppm: float
+) -> None:
+    """Two and a half frames an interval, twelve and a half: messages come at two places of them."""
+    for seed in range(6):
+        rng = np.random.default_rng([34, seed])
+        t = np.arange(round(min(60.0 * rate, 4000.0))) / rate * (1 + ppm * 1e-6)
+        stamp = on_frames(t + rng.uniform(0.0, tick), rng, tick)
+        receive = recorded(stamp, rng)
+        row = said(tmp_path, stamp, receive)
+        assert set(found(row)) == {"stamped_on_arrival"}
+        bound, true = row.residual_s.bound, np.ptp(receive - t)
+        assert bound is not None
+        assert 0.95 * true < bound < max(true, tick) + 1.1 * np.ptp(receive - stamp)
+
+
 @pytest.mark.parametrize("rate", [47.3, 20.2, 30.1])
 def test_intervals_near_whole_frames_hide_none(tmp_path: Path, rate: float) -> None:
     """A tenth of a frame off: over frames they would be a frame more and less apart."""

@@ -28,6 +28,9 @@ _LONGEST: Final = 1.5  # of an interval: a frame holds hardly more than one mess
 _STRETCH: Final = 24  # messages over which a comb stands still
 _SKEWED: Final = 0.2
 _CLOCKS: Final = 3e-4  # of an interval
+_PART_OF_FRAME: Final = 0.04  # 1 ms of 16 ms is 0.0625
+_MOST_TRIED: Final = 500
+_FEWEST, _MOST_NOISE = 8, 8.0  # messages on either side; spreads by which a comb has moved
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,8 @@ def framed(when: Array) -> Framed | None:
     for frame in (*TICKS_S, *(f for f in FRAMES_S if f >= FULL_SPEED_S)):
         if frame > _LONGEST * usual or not (on_comb(passed, frame) and _whole(when, frame)):
             continue
+        if _leaves_comb(when, frame):
+            continue
         noise = late_by(when, frame)
         if noise is not None:
             return Framed(frame, noise, False)
@@ -69,14 +74,31 @@ def on_comb(passed: Array, frame: float) -> bool:
     return float(np.mean(_off(passed, frame))) <= _MOST_OFF
 
 
+def _leaves_comb(when: Array, frame: float) -> bool:
+    """Whether stamps move on by part of a frame and stay: they lie on a comb of shorter ones.
+
+    A message that a host noted late is off by itself, and the next ones lie as those before.
+    """
+    passed = np.diff(when)
+    x = when - frame * np.concatenate([[0.0], np.cumsum(np.round(passed / frame))])
+    for at in np.flatnonzero(_off(passed, frame, _PART_OF_FRAME))[:_MOST_TRIED].tolist():
+        before, after = x[max(0, at + 1 - _STRETCH) : at + 1], x[at + 1 : at + 1 + _STRETCH]
+        if min(before.size, after.size) < _FEWEST:
+            continue
+        moved = float(np.median(after) - np.median(before))
+        if abs(moved) > _PART_OF_FRAME * frame and abs(moved) > _MOST_NOISE * spread(after):
+            return True
+    return False
+
+
 def _whole(when: Array, frame: float) -> bool:
     """Whether the usual interval is a whole number of frames, but for what two clocks differ by."""
     usual = float(np.median(when[_STRETCH:] - when[:-_STRETCH])) / _STRETCH
     return abs(usual - frame * round(usual / frame)) < _CLOCKS * usual
 
 
-def _off(passed: Array, frame: float) -> Mask:
-    return np.asarray(np.abs(passed - frame * np.round(passed / frame)) > _NEAR * frame)
+def _off(passed: Array, frame: float, near: float = _NEAR) -> Mask:
+    return np.asarray(np.abs(passed - frame * np.round(passed / frame)) > near * frame)
 
 
 def _varies(passed: Array, frame: float) -> bool:

@@ -65,21 +65,26 @@ def _restored(series: Series, faults: tuple[StampFault, ...]) -> _Restored | Non
     if rhythm is None:
         rhythm = _rhythm(when, cadence(series), tick_s)
     if rhythm is not None:
-        unseen_s = _unseen(when - rhythm, when, tick_s) if "packetised" in names else 0.0
+        held_s = _timer_of(tick_s) if "packetised" in names else _frame_of(faults)
+        unseen_s = _unseen(when - rhythm, when, held_s)
         return _Restored(np.asarray(late + when - rhythm), unseen_s)
     return None if names & {"packetised", "stamped_on_arrival"} else _Restored(late)
 
 
 def _unseen(waits: Array, when: Array, tick_s: float) -> float:
-    """By how much waits for a chip's timer may differ more than they seem to [s].
+    """By how much waits for a chip's timer or a bus's frame may differ more than they seem to [s].
 
     Where a sensor's interval is a simple part or multiple of the tick its messages come at a few
     places of it, and the sensor's clock may move within what lies between them without a trace.
-    Packets of another length are of whole numbers of messages, which no clock moves.
     """
-    if min(abs(tick_s / timer - 1.0) for timer in (*TICKS_S, FULL_SPEED_S)) > _SAME:
-        return 0.0
     return min(max(0.0, tick_s - float(np.ptp(waits))), _CLOCKS * float(when[-1]))
+
+
+def _timer_of(tick_s: float) -> float:
+    """The length of packets that a chip's timer or a bus's frame makes [s]; 0 of others, which are
+    of whole numbers of messages that no clock moves."""
+    timers = (*TICKS_S, FULL_SPEED_S)
+    return tick_s if min(abs(tick_s / timer - 1.0) for timer in timers) <= _SAME else 0.0
 
 
 def _tick_of(faults: tuple[StampFault, ...]) -> float:
@@ -89,6 +94,12 @@ def _tick_of(faults: tuple[StampFault, ...]) -> float:
             size = fault.parameters.get("interval_s") or fault.parameters["resolution_s"]
             return float(size)
     return 0.0
+
+
+def _frame_of(faults: tuple[StampFault, ...]) -> float:
+    """The frames of a bus at whose ends messages were stamped [s]; 0 of others."""
+    whole = [f for f in faults if f.fault == "stamped_on_arrival" and f.from_s is None]
+    return max((float(f.parameters.get("interval_s") or 0.0) for f in whole), default=0.0)
 
 
 def _of_coarse(series: Series, when: Array, tick_s: float, names: set[FaultName]) -> Array | None:
