@@ -149,6 +149,12 @@ def test_no_line_ends_between_a_figure_and_its_unit(unit: str) -> None:
     assert lines == ["It is up to", f"12.5 {unit}"]  # 16 columns: the figure would fit alone
 
 
+def test_no_line_ends_before_an_uncertainty() -> None:
+    assert unbroken("by 1.24 \u00b1 0.12 ms, \u00b1 or so") == (
+        "by 1.24\u00a0\u00b1\u00a00.12\u00a0ms, \u00b1 or so"
+    )
+
+
 def test_no_line_ends_inside_a_figure_of_nats() -> None:
     told = unbroken("saves 13 436.0 nat; 3 000 rows, 2026 100 was 12 of 1000")
     assert told.replace("\u00a0", "_") == "saves 13_436.0_nat; 3_000 rows, 2026_100 was 12 of 1000"

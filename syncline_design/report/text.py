@@ -19,7 +19,7 @@ _MICRO = re.compile(r"(?<=\d) u(?=(?:[smW]|rad)\b)")
 _BESIDE: Final = ("m/s\N{SUPERSCRIPT TWO}", "deg/s\N{SUPERSCRIPT TWO}", "m/(m/s2)", "mm/(m/s2)",
                   "nat", "\N{GREEK SMALL LETTER SIGMA}", "kB", "MB", "GB")  # fmt: skip
 _UNIT: Final = "|".join(map(re.escape, sorted((*UNITS, *_BESIDE), key=len, reverse=True)))
-_GAP: Final = re.compile(rf"(?<=\d) (?=\d{{3}}(?!\d)|(?:{_UNIT})(?!\w))")
+_GAP: Final = re.compile(rf"(?<=\d) (?=\d{{3}}(?!\d)|\u00b1|(?:{_UNIT})(?!\w))|(?<=\u00b1) (?=\d)")
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~^$])")
 
 
