@@ -134,3 +134,16 @@ def test_short_names_and_states_stand_on_one_line(browser: Any, tmp_path: Path) 
     high = "e => e.getClientRects().length && e.querySelector('bdi').getClientRects().length"
     with Opened(browser, path, viewport=WIDE) as opened:
         assert opened.page.eval_on_selector("tbody th", high) == 1
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize(("last", "least"), [("line 14", "0px"), ("lines 14, 15", "112px")])
+def test_room_is_kept_for_words_alone(browser: Any, tmp_path: Path, last: str, least: str) -> None:
+    """On a tablet seven columns that end in a few letters fit; 7 rem for them would cut them."""
+    path = tmp_path / "page.html"
+    heads = ("Requirement", "Status", "Limits", "Value", "Limit", "Margin", "In the spec")
+    rows = [["ACC-1", "pass", "error", "1.661 m", "3 m", "44.6 %", last]]
+    path.write_text(page(*show(table("x", heads, rows))), "utf-8")
+    with Opened(browser, path, viewport={"width": 768, "height": 900}) as opened:
+        width = "e => { const w = getComputedStyle(e).minWidth; return w === 'auto' ? '0px' : w; }"
+        assert opened.page.eval_on_selector("tbody td:last-child", width) == least
