@@ -21,6 +21,7 @@ from syncline_design.campaign.naming import Naming
 from syncline_design.campaign.pool import Pool, Scoped, fitted, pool_of
 from syncline_design.campaign.store import read_store
 from syncline_design.campaign.telling import on_average
+from syncline_design.campaign.twice import is_same
 from syncline_design.cli.app import app
 from syncline_design.diagnosis import DiagnosisSettings
 from syncline_design.diagnosis.noise import row_covariance
@@ -283,6 +284,40 @@ def test_a_store_refuses_what_it_must(weak: Path, stored: Path, tmp_path: Path) 
     assert not any(run["new"] for run in again.to_json()["joint"]["logs"])
 
 
+@pytest.mark.parametrize("copy", ["rounded", "a row less"])
+def test_a_run_that_was_written_otherwise_is_the_same_run(
+    copy: str, weak: Path, stored: Path, tmp_path: Path
+) -> None:
+    """The same rows with fewer digits, or less one of them, would count twice."""
+    head, *rows = Path(logs(weak)[0]).read_text("utf-8").splitlines()
+    if copy == "rounded":
+        rows = [",".join(f"{float(cell):.5f}" for cell in row.split(",")) for row in rows]
+    else:
+        rows = rows[1:]
+    log = tmp_path / "copy.csv"
+    log.write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    before = stored.read_bytes()
+    said = refused(stored, str(weak / "spec.yaml"), str(log))
+    assert "holds the same rows as run 1" in " ".join(said.split())
+    assert stored.read_bytes() == before
+
+
+def test_two_runs_are_the_same_as_often_as_their_noise_is() -> None:
+    """Scores s = N theta + N^(1/2) z: of one path with other noise never, with the same always."""
+    rng = np.random.default_rng(4)
+    root = rng.standard_normal((40, 12))
+    labels = tuple(("latency", "position", 0, f"p{k}_s") for k in range(12))
+
+    def run(noise: np.ndarray, weight: float = 1.0) -> Sufficient:
+        normal = weight * root.T @ root
+        score = normal @ np.arange(12.0) + weight * root.T @ noise
+        return Sufficient(labels, normal, score, 0.0, normal, ())
+
+    first = rng.standard_normal(40)
+    assert is_same(run(first), run(first, 0.998))  # two of a thousand rows are missing
+    assert not any(is_same(run(first), run(rng.standard_normal(40))) for _ in range(500))
+
+
 @pytest.mark.parametrize("change", ["edit", "drop", "swap", "forge", "garbage"])
 def test_a_store_that_was_tampered_with_is_damaged(
     change: str, weak: Path, stored: Path, tmp_path: Path
@@ -322,7 +357,7 @@ def test_a_torn_last_line_is_dropped_and_said(weak: Path, stored: Path, tmp_path
     again = read_store(torn)
     assert again is not None
     assert (len(again.entries), again.torn) == (2, 0)
-    assert again.runs[1].fingerprint == read_store(stored).runs[1].fingerprint  # type: ignore[union-attr]
+    assert again.runs[1].score == read_store(stored).runs[1].score  # type: ignore[union-attr]
 
 
 def test_options_that_ask_for_nothing_are_refused(weak: Path) -> None:

@@ -18,6 +18,7 @@ from syncline_design.campaign.store import (
     read_store,
 )
 from syncline_design.campaign.telling import Told, tell
+from syncline_design.campaign.twice import is_same
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.search import DiagnosisSettings, SearchProgress, silent
@@ -126,8 +127,9 @@ def _demand_different(request: JointRequest, stored: Stored | None) -> None:
 
 def _demand_unlike(run: Run, entries: Sequence[Entry], path: Path) -> None:
     """Refuse a log whose statistics are another's: the same rows in another format."""
+    found = run.statistics()
     for one in entries:
-        if run.fingerprint == one.run.fingerprint:
+        if is_same(found, one.found):
             raise JointError(
                 f"{path}: holds the same rows as run {one.number} ({', '.join(one.run.files)}); "
                 "expected each run once"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Final
@@ -74,12 +73,6 @@ class Run(Record):
     square: float
     gram: str
     less: tuple[PartsKept, ...]
-
-    @property
-    def fingerprint(self) -> str:
-        """Of the statistics alone: the same log under another name or in another format."""
-        text = "\n".join([*self.parameters, self.normal, self.score])
-        return hashlib.sha256(text.encode()).hexdigest()
 
     def statistics(self) -> Sufficient:
         """The statistics unpacked; PackingError where they are not what they say."""

@@ -24,6 +24,7 @@ from syncline_design import __version__
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.packing import PackingError
+from syncline_design.campaign.twice import is_same
 from syncline_design.diagnosis.same_system import description, differences
 from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.machine.appended_files import append_line, whole_lines
@@ -209,9 +210,12 @@ def _twice(path: Path, files: str, one: Entry) -> BadInput:
 
 
 def demand_new(stored: Stored | None, run: Run, path: Path) -> None:
-    """Refuse a run that the store holds."""
-    for one in stored.entries if stored is not None else ():
-        if run.sha256 == one.run.sha256 or run.fingerprint == one.run.fingerprint:
+    """Refuse a run that the store holds, whatever its file looks like."""
+    if stored is None:
+        return
+    found = run.statistics()
+    for one in stored.entries:
+        if run.sha256 == one.run.sha256 or is_same(found, one.found):
             raise _twice(path, ", ".join(run.files), one)
 
 
