@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,8 +17,12 @@ import pymap3d
 import pytest
 
 import syncline_design as sd
-from syncline_design.planning.telling import PlanRun
+from syncline_design.planning.drives import outcome
+from syncline_design.planning.setup import PlanRequest, Setup
+from syncline_design.planning.telling import PlanRun, Telling
+from syncline_design.planning.wanted import PlanWanted, reach_of
 from syncline_design.report.plans import render_plan
+from syncline_design.spec.load import load
 from tests.world import make_log, scenario
 
 ORIGIN = (47.3, 8.55, 460.0)
@@ -50,7 +55,7 @@ ITEM = {
     "required": ["autoContinue", "command", "doJumpId", "frame", "params", "type"],
     "properties": {
         "autoContinue": {"type": "boolean"},
-        "command": {"enum": [16, 22, 178]},
+        "command": {"enum": [16, 22, 115, 178, 194]},
         "doJumpId": {"type": "integer", "minimum": 1},
         "frame": {"enum": [2, 3]},
         "params": {
@@ -134,6 +139,85 @@ def test_missions_of_other_vehicles_fit_the_format_and_the_vehicle(other: PlanRu
                 driven_s += item["params"][0] + (far / speed if far > 0.01 else 0.0)
             before = here
     assert driven_s == pytest.approx(path.time_s[-1] - path.time_s[0], rel=0.05)
+
+
+def course(run: PlanRun) -> list[tuple[float, dict[str, float], int]]:
+    """What an autopilot makes of a mission: when it is at each place, the heading and the way round
+    that it was told, and whether it was told to reverse, in the order of ArduPilot (commands before
+    a place count on the way there)."""
+    now, speed, before = float(run.path.time_s[0]), math.nan, None
+    told, astern, found = {}, 0, []
+    for item in json.loads(render_plan("qgc", run))["mission"]["items"]:
+        first, second, third = item["params"][:3]
+        match item["command"]:
+            case 178:
+                speed = second
+            case 115:
+                told = {"to": first, "rate": second, "way": third}
+            case 194:
+                astern = int(first)
+            case 16:
+                lat, lon, height = item["params"][4:]
+                here = np.array(pymap3d.geodetic2ned(lat, lon, ORIGIN[2] + height, *ORIGIN))
+                far = 0.0 if before is None else float(np.linalg.norm(here - before))
+                now += first if first > 0.0 else far / speed if far > 0.01 else 0.0
+                found.append((now, dict(told), astern))
+                before = here
+    return found
+
+
+def driven(folder: Path, platform: str, leg: str) -> PlanRun:
+    """A drive of all legs of a name, with lines between, whether or not they would be chosen."""
+    path = folder / "vehicle.yaml"
+    path.write_text(SPEC.replace("PLATFORM", f"{{{platform}, baseline: 1 m}}"), encoding="utf-8")
+    asked = PlanRequest(PlanWanted(reach_of("latency(position)=1 ms")), line_plans=False)
+    setup = Setup.begun(load(path), asked)
+    legs = [told for told in setup.told if leg in told.leg.name]
+    line = next(told for told in setup.told if told.leg.name == "straight line")
+    drive = outcome(setup.world, [part for one in legs for part in (line, one)])
+    return Telling(setup).whole(drive, None, math.inf)
+
+
+@pytest.mark.parametrize("leg", ["spin", "astern", "sweeps"])
+def test_a_copter_is_told_where_to_head(leg: str, tmp_path: Path) -> None:
+    """Its autopilot does not look at a waypoint's heading: CONDITION_YAW, with the way round."""
+    run = driven(
+        tmp_path, "v_max: 9 m/s, omega_max: 50 deg/s, distance: 40 m, motion: multirotor", leg
+    )
+    yaw = np.degrees(np.unwrap(run.path.euler_rad[:, 2]))
+    flown = course(run)
+    assert flown[-1][0] == pytest.approx(run.path.time_s[-1], rel=0.05)
+    stretch = run.path.time_s[-1] / flown[-1][0]
+    total = 0.0
+    for (_, before, _), (at, told, _) in pairwise(flown):
+        really = float(np.interp(at * stretch, run.path.time_s, yaw))
+        assert abs((told["to"] - really + 180.0) % 360.0 - 180.0) < 30.0
+        assert told["rate"] <= 50.0
+        turn = (told["to"] - before["to"] + 180.0) % 360.0 - 180.0
+        if told != before and told["way"]:
+            turn = (turn * told["way"]) % 360.0 * told["way"]  # that way round
+        total += turn
+    assert total == pytest.approx(yaw[-1] - yaw[0], abs=5.0)
+
+
+@pytest.mark.parametrize("motion", ["ground", "surface"])
+def test_what_goes_astern_is_told_to_reverse(motion: str, tmp_path: Path) -> None:
+    """Of a rover or a boat the heading is where it goes, unless it was told to reverse."""
+    run = driven(
+        tmp_path, f"v_max: 6 m/s, omega_max: 30 deg/s, distance: 50 m, motion: {motion}", "astern"
+    )
+    velocity = np.gradient(run.path.position_m, run.path.time_s, axis=0)
+    yaw = run.path.euler_rad[:, 2]
+    ahead = velocity[:, 0] * np.cos(yaw) + velocity[:, 1] * np.sin(yaw)
+    flown = course(run)
+    stretch = run.path.time_s[-1] / flown[-1][0]
+    right = []
+    for (begun, _, _), (at, _, astern) in pairwise(flown):
+        middle = float(np.interp(0.5 * (begun + at) * stretch, run.path.time_s, ahead))
+        if abs(middle) > 0.5:
+            right.append((middle < 0.0) == bool(astern))
+    assert {one[2] for one in flown} == {0, 1}
+    assert np.mean(right) > 0.95
 
 
 def test_kml_of_other_vehicles_keeps_the_order_of_its_schema(other: PlanRun) -> None:

@@ -24,6 +24,7 @@ COLUMNS: Final = (
 )  # fmt: skip
 KML: Final = "http://www.opengis.net/kml/2.2"
 WAYPOINT, CHANGE_SPEED, TAKEOFF = 16, 178, 22  # MAV_CMD of MAVLink's common set
+HEADING, REVERSE = 115, 194  # the same: CONDITION_YAW, DO_SET_REVERSE
 RELATIVE, MISSION = 3, 2  # MAV_FRAME: relative to home; of a command without a place
 GENERIC, FIXED_WING, QUADROTOR, ROVER, BOAT, SUBMARINE = 0, 1, 2, 10, 11, 12  # MAV_TYPE
 VEHICLES: Final = {
@@ -32,6 +33,9 @@ VEHICLES: Final = {
 }  # fmt: skip
 ARDUPILOT = 3  # MAV_AUTOPILOT
 APART_M, APART_S = 0.05, 5.0  # by how much a straight line may miss the path, and for how long
+APART_RAD: Final = math.radians(10.0)  # by which a steady turn may miss a heading that is flown
+MOST_TURN_RAD: Final = math.radians(120.0)  # in one command
+SAME_DEG: Final = 1.0  # of headings that need no command of their own
 LINE_ROWS: Final = 5  # rows from point to point of a drawn line
 
 
@@ -173,14 +177,15 @@ def qgc(run: PlanRun) -> str:
 
 
 def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
-    """A take-off for what flies, then the speed to each place and the place itself."""
+    """A take-off for what flies, then the speed to each place, how it is headed, and the place."""
     path = run.path
     places, height = geodetic(run, path.position_m), -path.position_m[:, 2]
-    yaw = np.degrees(path.euler_rad[:, 2]) % 360.0
+    yaw = np.unwrap(path.euler_rad[:, 2])
     if run.motion in ("multirotor", "fixed_wing"):
         yield _item(TAKEOFF, [0, 0, 0, None, *_place(places[0], height[0])])
     said = -1.0
-    kept = corners(path.time_s, path.position_m)
+    kept = corners(path.time_s, path.position_m, yaw if run.motion == "multirotor" else None)
+    headed = _headed(run, kept, yaw)
     for before, k in zip([0, *kept], kept, strict=False):
         step = path.position_m[k] - path.position_m[before]
         lasts = float(path.time_s[k] - path.time_s[before])
@@ -189,8 +194,51 @@ def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
         if moving and abs(speed - said) > 0.02 * max(speed, said):
             yield _item(CHANGE_SPEED, [1, speed, -1, 0, 0, 0, 0], MISSION)
             said = speed
+        yield from headed.get(k, ())
         hold = 0.0 if moving else round(lasts, 1)
-        yield _item(WAYPOINT, [hold, 0, 0, round(float(yaw[k]), 1), *_place(places[k], height[k])])
+        to = round(math.degrees(yaw[k]) % 360.0, 1)
+        yield _item(WAYPOINT, [hold, 0, 0, to, *_place(places[k], height[k])])
+
+
+def _headed(run: PlanRun, kept: list[int], yaw: Any) -> dict[int, list[dict[str, Any]]]:
+    """By place, how to head there, of what may head elsewhere than it goes.
+
+    ArduPilot does not look at the heading of a waypoint: a copter is told with a command of its
+    own, by so many degrees a second and which way round; what goes astern on the ground or on
+    water, to reverse.
+    """
+    ways = list(zip([kept[0], *kept], kept, strict=False))
+    if run.motion == "multirotor":
+        return dict(_turned(run, ways, yaw))
+    return dict(_reversed(run, ways, yaw)) if run.motion in ("ground", "surface") else {}
+
+
+def _turned(run: PlanRun, ways: list[tuple[int, int]], yaw: Any) -> Iterator[tuple[int, Any]]:
+    """Headings of a copter, each as it is another than was told before."""
+    told = math.inf
+    for before, k in ways:
+        to = math.degrees(yaw[k])
+        if abs(to - told) < SAME_DEG:
+            continue
+        turn, lasts = (
+            to - math.degrees(yaw[before]),
+            float(run.path.time_s[k] - run.path.time_s[before]),
+        )
+        rate = round(abs(turn) / lasts, 1) if lasts > 0.0 else 0.0
+        way = 0 if abs(turn) < SAME_DEG else math.copysign(1, turn)
+        yield k, [_item(HEADING, [round(to % 360.0, 1), rate, way, 0, 0, 0, 0], MISSION)]
+        told = to
+
+
+def _reversed(run: PlanRun, ways: list[tuple[int, int]], yaw: Any) -> Iterator[tuple[int, Any]]:
+    """Where a vehicle begins to go astern, and where it goes ahead again."""
+    astern = False
+    for before, k in ways:
+        step = run.path.position_m[k] - run.path.position_m[before]
+        ahead = step[0] * math.cos(yaw[before]) + step[1] * math.sin(yaw[before])
+        if abs(ahead) > APART_M and (ahead < 0.0) != astern:
+            astern = not astern
+            yield k, [_item(REVERSE, [int(astern), 0, 0, 0, 0, 0, 0], MISSION)]
 
 
 def _place(place: Any, height_m: float) -> list[float]:
@@ -204,15 +252,24 @@ def _item(command: int, params: list[Any], frame: int = RELATIVE) -> dict[str, A
     }  # fmt: skip
 
 
-def corners(time_s: Any, places_m: Any) -> list[int]:
-    """Rows of a path between which straight lines at constant speed miss it by APART_M at most."""
+def corners(time_s: Any, places_m: Any, yaw: Any = None) -> list[int]:
+    """Rows of a path between which straight lines at constant speed miss it by APART_M at most,
+    and steady turns its headings (where they count) by APART_RAD."""
     kept, begun = [0], 0
     for k in range(2, len(time_s)):
         share = (time_s[begun + 1 : k] - time_s[begun]) / (time_s[k] - time_s[begun])
         line = places_m[begun] + share[:, None] * (places_m[k] - places_m[begun])
         off = float(np.max(np.linalg.norm(places_m[begun + 1 : k] - line, axis=1)))
         scale = max(APART_M, 0.02 * float(np.linalg.norm(places_m[k] - places_m[begun])))
-        if off > scale or time_s[k] - time_s[begun] > APART_S:
+        turned = yaw is not None and _turns_apart(yaw[begun : k + 1], share)
+        if off > scale or time_s[k] - time_s[begun] > APART_S or turned:
             begun = k - 1
             kept.append(begun)
     return [*kept, len(time_s) - 1]
+
+
+def _turns_apart(yaw: Any, share: Any) -> bool:
+    """Whether headings are no steady turn, or more than one command turns."""
+    turn = yaw[-1] - yaw[0]
+    missed = float(np.max(np.abs(yaw[1:-1] - yaw[0] - share * turn)))
+    return missed > APART_RAD or abs(turn) > MOST_TURN_RAD
