@@ -51,6 +51,24 @@ def test_the_least_that_is_said_to_be_enough_is_hardly_more_than_enough(tmp_path
     assert least <= said <= 1.01 * least
 
 
+NARROW = (
+    ("v_max: 9 m/s, omega_max: 50 deg/s", "v_max: 8 m/s, omega_max: 60 deg/s"),
+    ("acceleration: 2 m/s^2, area: [250 m, 250 m]", "area: [60 m, 40 m], height: 25 m"),
+)
+
+
+def test_a_drive_of_one_leg_that_is_enough_is_not_passed_by(tmp_path: Path) -> None:
+    """One full circle is enough, which is less than its legs say alone: asked with fewer minutes
+    than the least, the same plan must not find it."""
+    spec = load(spec_with(tmp_path, *NARROW))
+    wanted = PlanWanted(reach_of("latency(position)=1 ms, lever_arm(position)=1 cm"))
+    least = planned(spec, PlanRequest(wanted, line_plans=False)).result.least_minutes
+    assert least is not None
+    for share in (0.95, 0.75, 0.62):
+        fewer = planned(spec, PlanRequest(wanted, minutes=share * least, line_plans=False)).result
+        assert not fewer.reached or fewer.confused, share
+
+
 @pytest.mark.parametrize(("tolerance", "times"), [(0.05, 400.0), (0.3, 11.111), (2.0, 0.25)])
 def test_a_drive_is_driven_as_often_as_its_information_asks(tolerance: float, times: float) -> None:
     """Of one parameter: sigma^2 = 1 / (n I), so that n = 1 / (I tolerance^2), the last in part."""

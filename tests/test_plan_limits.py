@@ -20,7 +20,7 @@ from syncline_design.planning.run import plan as planned
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.telling import PlanRun, Telling
 from syncline_design.planning.vehicle import vehicles
-from syncline_design.planning.wanted import PlanWanted, separate_of
+from syncline_design.planning.wanted import PlanWanted, reach_of, separate_of
 from syncline_design.report.plans import render_plan
 from syncline_design.spec.load import load
 from tests.planned_specs import call, spec_with
@@ -129,6 +129,18 @@ def test_sweeps_lean_to_what_is_said(tmp_path: Path) -> None:
         assert said == pytest.approx(most, rel=0.05)
 
 
+def test_what_takes_longer_than_any_drive_is_no_matter_of_the_platform(tmp_path: Path) -> None:
+    """A latency to 1 ns: sigma falls with the root of the time, so that some drive would tell it,
+    after 0.056 ms in ten minutes in some 60 000 years."""
+    asked = PlanRequest(PlanWanted(reach_of("latency(position)=1 ns")), line_plans=False)
+    run = planned(load(spec_with(tmp_path)), asked)
+    assert not run.result.reached
+    assert run.result.least_minutes is None
+    said = " ".join(render_plan("markdown", run).replace("\u00a0", " ").split())
+    assert "no drive of up to 4 h was found that tells so much" in said
+    assert "no drive of this platform" not in said
+
+
 def test_what_no_drive_tells_is_not_said_to_be_reached(tmp_path: Path) -> None:
     path = spec_with(tmp_path)
     rivals = "lever_arm(position), filter_lag(position)"
@@ -157,7 +169,8 @@ def test_a_pair_that_only_takes_longer_is_not_said_to_hang_on_its_size(tmp_path:
 
 
 def test_a_stated_height_is_kept_or_refused(tmp_path: Path) -> None:
-    """By plain geometry: d is 40 m, so that from 34 m up targets are in reach and from 60 m none.
+    """By plain geometry: d is 40 m, so that from 34 m up targets are in reach and from 60 m none,
+    nor from 37.5 m: 38 m away they would be steeper below than 75 deg, 38 sin(75 deg) = 36.7.
 
     Closer to them than stated, the figures were those of another drive.
     """
@@ -175,11 +188,27 @@ def test_a_stated_height_is_kept_or_refused(tmp_path: Path) -> None:
         for row in rows
     ]  # fmt: skip
     assert max(away) < 40.0
-    done = call(spec_with(tmp_path, (stated[0], "motion: multirotor, height: 60 m")), *wanted)
-    assert done.exit_code == 2, done.output
-    words = " ".join(done.stderr.split())
-    assert "keeps 60 m over its targets, and they are at most 38 m away" in words
-    assert "expected a height of at most 95 % of its distance, 38 m" in words
+    for height in (60.0, 37.5):
+        text = f"motion: multirotor, height: {height:g} m"
+        done = call(spec_with(tmp_path, (stated[0], text)), *wanted)
+        assert done.exit_code == 2, done.output
+        words = " ".join(done.stderr.split())
+        assert f"keeps {height:g} m over its targets, and they are at most 38 m away" in words
+        assert "expected a height of at most 92 % of its distance, 36.7 m" in words
+
+
+def test_a_drive_that_sees_no_target_for_long_says_so(tmp_path: Path) -> None:
+    """From just below the highest height few are in sight; counted in what is written."""
+    waypoints, page = tmp_path / "drive.csv", tmp_path / "drive.json"
+    spec = spec_with(tmp_path, ("motion: multirotor", "motion: multirotor, height: 36.6 m"))
+    asked = ("--reach", "latency(position)=1 ms", "-q")
+    done = call(spec, *asked, "-o", f"csv:{waypoints}", "-o", f"json:{page}")
+    assert done.exit_code in (0, 1), done.output
+    with waypoints.open(encoding="utf-8", newline="") as stream:
+        blind = [not row["target_down_m"] for row in csv.DictReader(stream)]
+    (said,) = json.loads(page.read_text("utf-8"))["cautions"]
+    assert 0.15 < sum(blind) / len(blind) < 1.0
+    assert float(said.split()[1]) == pytest.approx(100.0 * sum(blind) / len(blind), abs=1.0)
 
 
 def test_a_height_over_nothing_that_is_ranged_to_is_kept(tmp_path: Path) -> None:

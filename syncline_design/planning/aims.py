@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.planning.vehicle import FAR, Vehicle
+from syncline_design.planning.vehicle import FAR, STEEP_RAD, Vehicle
 
-STEEP_RAD = math.radians(75.0)  # beyond, azimuths mean nothing
 NEAR = 0.15  # of the range d: targets are looked for from there on, up to FAR
 SPACING = 0.3  # of d: of the places that are tried
 LEVELS = (-0.04, 0.0, 0.04)  # of d: targets are not all at one height

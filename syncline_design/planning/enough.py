@@ -2,7 +2,9 @@
 
 The search adds up what legs tell alone.  Turns between them tell more, joints and other targets
 less, so that what it aims at (its margin) is not what the drive reaches: that is judged whole, and
-the margin is moved by how far it was off, until the drive is enough and hardly more.
+the margin is moved by how far it was off, until the drive is enough and hardly more.  How far it is
+off differs from drive to drive: of a single leg most of all.  So shorter drives that the search
+passed by, since their legs alone fall somewhat short, are judged whole as well.
 """
 
 from __future__ import annotations
@@ -11,6 +13,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import field
 from typing import Final
+
+import numpy as np
 
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -24,6 +28,8 @@ CLOSE: Final = 0.985  # of what is asked: from there on a drive tells hardly mor
 TRIED: Final = 5  # margins
 MOST_JUDGED: Final = 24  # drives that are judged whole
 ALIKE: Final = 0.003  # by which two margins differ that are as good as one
+PASSED_BY: Final = 3.0  # times off what is asked, by its legs alone, that a drive may prove enough
+MOST_PASSED_BY: Final = 24  # of these that are judged whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +59,25 @@ def shortest(setup: Setup, search: LegSearch, most_s: float) -> Shortest:
     if not found:
         return Shortest(search.grown([], most_s), search.margin, judged=False)
     enough = whole.first_enough(sorted(found, key=lasting_s))
+    if enough is not None:
+        enough = _passed_by(search, whole, enough)
     return Shortest(enough or found[0], tried.passed or search.margin, enough is not None)
+
+
+def _passed_by(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTold]:
+    """The shortest drive that is enough, of this one and of those that the search has looked at,
+    as many as may be judged; what falls short by its legs alone the least is judged first."""
+    by_id = {id(told): told for told in search.legs}
+    off = {key: float(np.max(one.every, initial=0.0)) for key, one in search.known.items() if key}
+    likely = sorted((key for key, size in off.items() if size <= PASSED_BY), key=off.__getitem__)
+    left = MOST_PASSED_BY
+    for legs in ([by_id[k] for k in key] for key in likely):
+        if not left or search.deadline.is_over:
+            break
+        if lasting_s(legs) < lasting_s(enough) - 1e-6 and search.fits(legs):
+            left -= 1
+            enough = legs if whole.worst(legs) <= 1.0 else enough
+    return enough
 
 
 @dataclass(slots=True)
@@ -70,7 +94,7 @@ class _Margins:
             self.passed = max(self.passed, self.now)
         else:
             self.failed = min(self.failed, self.now)
-        if CLOSE <= worst <= 1.0 or self.failed <= self.passed:
+        if CLOSE <= worst <= 1.0 or self.failed <= self.passed or not math.isfinite(worst):
             return False
         before, self.now = self.now, self.now * AIM / worst
         if not self.passed < self.now < self.failed:

@@ -53,13 +53,14 @@ class _Planning:
         search = LegSearch(self.setup.told, self.setup.judge, deadline, self._area(), effort)
         whole = shortest(self.setup, search, max(LONGEST_S, most_s))
         search = search.at(whole.margin)
-        if search.is_over and not search.reaches(whole.legs):
+        reaches = whole.judged or search.reaches(whole.legs)
+        if search.is_over and not reaches:
             raise NoVerdict("the search ended before it came to a drive that tells what is asked")
-        enough = search.reaches(whole.legs) and steered_s(self.setup.world, whole.legs) <= most_s
+        enough = reaches and steered_s(self.setup.world, whole.legs) <= most_s
         chosen = whole.legs if enough else best_within(search, most_s)
         in_force().doing("looking at the whole drive")
         chosen, found = self._judged(search, chosen, most_s)
-        least_s = self._least_s(search, found, whole.legs, most_s)
+        least_s = self._least_s(reaches, found, whole.legs, most_s)
         return Telling(self.setup).whole(found, least_s, most_s)
 
     def _area(self) -> tuple[float, float] | None:
@@ -105,12 +106,15 @@ class _Planning:
         return min(trials, key=lambda trial: search.value(trial)[1])[-1]
 
     def _least_s(
-        self, search: LegSearch, found: WholeDrive, whole: list[LegTold], most_s: float
+        self, reaches: bool, found: WholeDrive, whole: list[LegTold], most_s: float
     ) -> float | None:
-        """The least time that reaches all: this drive's, a longer one's, or so much of its kind."""
+        """The least time that reaches all: this drive's, a longer one's, or so much of its kind.
+
+        reaches: whether the longer one does.
+        """
         if self.setup.reached(found) and duration_s(found) <= most_s:
             return duration_s(found)
-        if search.reaches(whole):
+        if reaches:
             return max(steered_s(self.setup.world, whole), 1.001 * most_s)
         needed = times_needed(self.setup.judge, together(whole))
         return None if needed is None else max(needed * lasting_s(whole), 1.001 * most_s)

@@ -55,6 +55,7 @@ from syncline_design.planning.wanted import (
 )
 
 UNSEEN: Final = 0.7  # of the prior: what a drive leaves that uncertain, it does not show
+MOST_BLIND: Final = 0.15  # of a drive without a target in sight, before that is said
 ROW_S: Final = 0.1  # between rows of the path that is written
 MOST_PATH_ROWS: Final = 200_000
 
@@ -130,7 +131,12 @@ class Telling:
             ),
             flown=self._flown(),
             sized=bool(self.setup.world.beyond) or None,
-            cautions=(*self._cautions(), *self._beyond_areas(found.driven)) or None,
+            cautions=(
+                *self._cautions(),
+                *self._beyond_areas(found.driven),
+                *_out_of_sight(found.driven),
+            )
+            or None,
         )
         vehicle = self.setup.world.vehicles[found.stretches[-1].leg.stage]
         others = {
@@ -302,6 +308,14 @@ class Telling:
             bool(np.all(ratios <= 1.0)),
             tuple(one.message for one in log_checks(view)) or None,
         )
+
+
+def _out_of_sight(driven: Drive) -> Iterator[str]:
+    """For how much of the drive no target is in sight, in words, where that is much."""
+    share = 0.0 if driven.aims is None else float(np.mean(driven.aims.aimed < 0))
+    if share > MOST_BLIND:
+        part = to_digits(100.0 * share, 2)
+        yield f"For {part} % of the drive no target is in sight, and nothing is logged there."
 
 
 def _targets(driven: Drive, fixed: FixedTargets | None) -> tuple[PlannedTarget, ...]:

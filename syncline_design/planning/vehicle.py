@@ -26,6 +26,8 @@ BELOW: Final = ("mbes", "sonar", "usbl", "echo", "imaging_sonar", "multibeam")
 LONGEST_TURN_S: Final = 3600.0  # a turn about that takes longer is none
 HEIGHT_SHARE: Final = 0.6  # of the range d that the targets lie below
 FAR: Final = 0.95  # of the range d at which targets are at most
+STEEP_RAD: Final = math.radians(75.0)  # below the level, at most: beyond, azimuths mean nothing
+HIGHEST: Final = FAR * math.sin(STEEP_RAD)  # of the range d, over targets that are in sight
 
 
 class Usual(NamedTuple):
@@ -203,9 +205,9 @@ def _demand_turns(case: Case, stage: StageCase, found: Vehicle) -> None:
 
 
 def _demand_sight(case: Case, stage: StageCase, found: Vehicle) -> None:
-    """BadInput where the stated height leaves every target out of reach: its figures would be of
-    another drive."""
-    height, most = stage.platform.entry.height, FAR * found.distance_m
+    """BadInput where from the stated height no target is in sight: its figures would be of another
+    drive."""
+    height, most = stage.platform.entry.height, HIGHEST * found.distance_m
     if stage.role("ranging") is None or height is None or float(height) <= most:
         return
     flaw = Flaw(
@@ -213,8 +215,10 @@ def _demand_sight(case: Case, stage: StageCase, found: Vehicle) -> None:
         *case.position(("stages", stage.index, "platform")),
         f"stages.{stage.index}.platform.height",
         f"the platform of stage {stage.choice.name!r} keeps {to_digits(float(height), 4)} m over "
-        f"its targets, and they are at most {to_digits(most, 4)} m away",
-        f"a height of at most {to_digits(100 * FAR, 2)} % of its distance, {to_digits(most, 4)} m",
+        f"its targets, and they are at most {to_digits(FAR * found.distance_m, 4)} m away and at "
+        f"most {to_digits(math.degrees(STEEP_RAD), 2)} deg below the level",
+        f"a height of at most {to_digits(100 * HIGHEST, 2)} % of its distance, "
+        f"{to_digits(most, 3)} m",
         hint="state the distance at which the sensor is used, or the height at which it is flown",
     )
     raise BadInput((flaw,))

@@ -8,10 +8,11 @@ from functools import partial
 from typing import Final
 
 from syncline_design.machine.records import with_texts
-from syncline_design.model.figure_text import format_like, format_quantity
+from syncline_design.model.figure_text import format_duration, format_like, format_quantity
 from syncline_design.model.quantity import si_name, split_suffix, suffix_unit
 from syncline_design.model.unit_table import Dimension
 from syncline_design.planning.result import Flown, Plan, Separated
+from syncline_design.planning.run import LONGEST_S
 from syncline_design.planning.telling import PlanRun
 from syncline_design.report import charts_plan as drawings
 from syncline_design.report import numbers
@@ -80,8 +81,15 @@ def _outcome(found: Plan) -> Outcome:
     if found.least_minutes is None and _larger(found) is not None:
         return Outcome("bad", "\u2717", "Told apart only where it is larger")
     if found.least_minutes is None:
-        return Outcome("bad", "\u2717", "Not reachable: no drive of this platform tells it")
+        why = "no drive of this platform tells it" if found.inseparable else _none_found(found)
+        return Outcome("bad", "\u2717", f"Not reachable: {why}")
     return Outcome("bad", "\u2717", f"Not reachable in {numbers.number(found.minutes, 6)} min")
+
+
+def _none_found(found: Plan) -> str:
+    """What is asked is only a matter of time, and of more than any drive is looked at for."""
+    most_s = max(LONGEST_S, 60.0 * found.minutes)
+    return f"no drive of up to {format_duration(most_s)} was found that tells so much"
 
 
 def _sentences(found: Plan) -> Iterator[Inline]:
