@@ -12,7 +12,6 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 PLAUSIBLE: Final = 2.0  # standard deviations within which a constant is that no run shows
 SHOWN_NATS: Final = 2.0  # beyond one a parameter, from which runs show a constant
-MOST_SHOWN: Final = 8
 ANOTHER: Final = 1e-3  # share of its information that a constant has apart from those shown
 NO_INFORMATION: Final = 1e-10
 
@@ -47,13 +46,16 @@ def shown_constants(
 ) -> list[Constant]:
     """Effects that runs of information (P, P) and score (P,) show: forward, what gains most first.
 
+    As many as they show: after a hundred runs it may be every one that is not 0, and of those that
+    are not taken for constants a day that is driven otherwise makes a change.
+
     groups: places (G,) and parameters (G, p) of the effects of a size; inside (C,) their variance.
     The slopes of a run are those where its own search ended.  Two effects that are one to first
     order (a latency and a filter's lag) so differ a little where a change was named, and none
     elsewhere: both free, huge values of either sign would stand for the change as constants.
     """
     whole, found = total, list[Constant]()
-    while len(found) < MOST_SHOWN:
+    while True:
         taken = [one.term for one in found]
         best, at, least = None, 0, SHOWN_NATS
         for terms, index in groups:
@@ -65,7 +67,7 @@ def shown_constants(
             if gains[k] >= least:
                 best, at, least = (terms, index, apart), k, float(gains[k])
         if best is None:
-            break
+            return found
         terms, index, apart = best
         own, turn, another = index[at], apart.turn[at], apart.another[at]
         found.append(Constant(int(terms[at]), own, _held(_blocks(whole, own), turn, another)))
@@ -73,7 +75,6 @@ def shown_constants(
         across = total[:, own]
         score = score - across @ (inverse @ score[own])
         total = total - across @ inverse @ total[own]
-    return found
 
 
 def _blocks(total: Array, index: Index) -> Array:
