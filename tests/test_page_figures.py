@@ -23,6 +23,7 @@ from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
+from syncline_design.report.text import unbroken
 from syncline_design.spec.load import load_text
 from syncline_design.studies.definition import Factor
 from syncline_design.verdict.optimize import (
@@ -86,7 +87,7 @@ def test_a_datasheet_figure_reads_as_it_was_written() -> None:
             number, unit = text.split(" ")
             assert float(number) * UNITS[unit] == pytest.approx(value, rel=5e-4)
             assert unit == entry.value_text.split(" ")[1]
-            assert text in page
+            assert unbroken(text) in page
             assert text in said
     assert "Figure (SI)" not in page
     tolerances = found.result.tolerances
