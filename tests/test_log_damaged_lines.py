@@ -6,6 +6,7 @@ that the damage touches.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -185,6 +186,22 @@ def test_a_table_that_is_not_as_its_header_says_is_no_damage(tmp_path: Path, nam
         rows[1 + k] = rows[1 + k] + rows[1][4:5] + b",5;5"
     with pytest.raises(BadInput, match="cells"):
         written(tmp_path / "run.csv", rows).streams()
+
+
+@pytest.mark.parametrize(("every", "words"), [(1, "cells"), (11, "cells"), (400, "")])
+def test_looking_for_damaged_rows_takes_no_longer_than_it_may(
+    tmp_path: Path, every: int, words: str
+) -> None:
+    """A row too short each so many of 100 000: all, one in eleven, few."""
+    rows = [b"%d.5,%d.6" % (k, k) if k % every else b"7.5" for k in range(1, 100_001)]
+    began = time.process_time()
+    if words:
+        with pytest.raises(BadInput, match=words):
+            written(tmp_path / "run.csv", [b"stamp_s,receive_s", *rows]).streams()
+    else:
+        (stream,) = written(tmp_path / "run.csv", [b"stamp_s,receive_s", *rows]).streams()
+        assert stream.messages == 100_000 - 100_000 // every
+    assert time.process_time() - began < 20.0
 
 
 def test_a_header_settles_how_many_fields_where_rows_disagree(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ BLOCK_BYTES = 1 << 20
 MOST_HEAD = 1 << 20  # bytes in which the names have to come
 MOST_LINE = 1 << 22
 MOST_COLUMNS = 5_000
+MOST_LEFT_OUT, MOST_UNSOUND = 500, 60  # lines of a file; the latter take whole columns each time
 MOST_DAMAGED = 0.1  # of the lines; where more are not as the header says, it is how it was written
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 COMMENT, QUOTE, NEWLINE, BLANK = b"#"[0], b'"'[0], b"\n"[0], b" "[0]
@@ -224,11 +225,11 @@ class Losses:
     count: int = 0
     first: BadInput | None = None
 
-    def add(self, error: BadInput, lines: int) -> None:
+    def add(self, error: BadInput, lines: int, most: int = MOST_LEFT_OUT) -> None:
         """One more of so many lines; refuses where they are more than damage explains."""
         self.count += 1
         self.first = self.first or error
-        if self.count > MOST_DAMAGED * lines:
+        if self.count > min(MOST_DAMAGED * lines, most):
             raise self.first
 
     def said(self) -> str:
@@ -268,6 +269,8 @@ def blocks(path: Path, how: Dialect, end: int, losses: Losses | None = None) -> 
                 else:
                     found = _joined(_good(path, how, plain, line, losses))
                     line += plain.count(b"\n")
+                    if found is not None:
+                        found = _joined(_sound(found, losses, line - how.body_line))
                 if found is not None:
                     yield found
 
@@ -275,21 +278,42 @@ def blocks(path: Path, how: Dialect, end: int, losses: Losses | None = None) -> 
 def _good(
     path: Path, how: Dialect, raw: bytes, line: int, losses: Losses, lines: int = 0
 ) -> Iterator[RowBlock]:
-    """What is good of a block: it is halved as long as there is a damaged line in it."""
+    """The rows of a block: it is halved as long as there is a line in it that is no row."""
     lines = lines or line - how.body_line + raw.count(b"\n")
     try:
         found, _ = _block(path, how, raw, line)
-        if found is not None:
-            losses.demand(found)
-            yield found
     except BadInput as error:
-        middle = raw.rfind(b"\n", 0, len(raw) // 2) + 1 or raw.find(b"\n") + 1
+        middle = _middle(raw)
         if middle == len(raw):
             losses.add(error, lines)
             return
         yield from _good(path, how, raw[:middle], line, losses, lines)
         after = line + raw.count(b"\n", 0, middle)
         yield from _good(path, how, raw[middle:], after, losses, lines)
+    else:
+        if found is not None:
+            yield found
+
+
+def _sound(block: RowBlock, losses: Losses, lines: int) -> Iterator[RowBlock]:
+    """Rows that stand what is demanded of them, found by halves as well."""
+    try:
+        losses.demand(block)
+    except BadInput as error:
+        middle = _middle(block.text)
+        if middle == len(block.text):
+            losses.add(error, lines, MOST_UNSOUND)
+            return
+        rows = block.text.count(b"\n", 0, middle)
+        yield from _sound(RowBlock(block.text[:middle], block.lines[:rows]), losses, lines)
+        yield from _sound(RowBlock(block.text[middle:], block.lines[rows:]), losses, lines)
+    else:
+        yield block
+
+
+def _middle(text: bytes) -> int:
+    """Where the line begins that is about the middle one; behind the text where it is the only."""
+    return text.rfind(b"\n", 0, len(text) // 2) + 1 or text.find(b"\n") + 1
 
 
 def _joined(found: Iterable[RowBlock]) -> RowBlock | None:
