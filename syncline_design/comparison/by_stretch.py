@@ -8,7 +8,7 @@ from dataclasses import field
 from typing import Final
 
 from syncline_design.comparison.assumptions import Assumed
-from syncline_design.comparison.departing import amount, figure_of, of_stretch
+from syncline_design.comparison.departing import Departing, amount, figure_of, of_stretch
 from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.late_together import others_late
@@ -17,6 +17,7 @@ from syncline_design.diagnosis.consequence import SHARE
 from syncline_design.diagnosis.result import Smallest
 from syncline_design.diagnosis.stretches import OtherFit, ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
+from syncline_design.diagnosis.unlike_readings import factor_effect
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
@@ -53,10 +54,11 @@ class InStretches:
         for s in self.found.stands:
             fits: list[Stands | OtherFit] = [s, *_in_its_place(s)]
             turning = all(self._turns(f) for f in fits) or s.share >= SHARE
-            ways = (*(OneWay((of_stretch(fit),)) for fit in fits), *self._together(s))
+            ways = (*(OneWay((of_stretch(fit),)) for fit in fits), *self._together(s), *_noises(s))
             if s.sure and len(ways) > 1 and turning:
                 said = f"{of_stretch(s).words} stands out {_placed(s)}"
-                yield InDoubt(said, ways, s.from_s, s.to_s)
+                sound = bool(s.noise_of)
+                yield InDoubt(said, ways, s.from_s, s.to_s, may_be_sound=sound)
 
     def _together(self, s: Stands) -> list[OneWay]:
         return list(others_late(of_stretch(s), self.paper.case, self.kind))
@@ -73,13 +75,17 @@ class InStretches:
         place = _placed(s)
         rivals = _in_its_place(s)
         alone = all(self.is_of(f.label[0], (f.label[1],), f.stage, one) for f in rivals)
-        alone = alone and not others
+        alone = alone and not others and not s.noise_of
         if own and s.sure and alone:
             part = of_stretch(s)
             matters = "would turn the verdict" if turns else _AS_LARGE
             words = f"{part.words} stands out {place}, and {matters}{_built_in(s)}"
             return Judgement("broken", words, figure_of(one, part.parameters), s.from_s, s.to_s)
-        if s.sure:
+        if s.sure and s.noise_of:
+            whose = " or ".join(s.noise_of)
+            words = (f"{of_stretch(s).words} stands out {place}, and slow noise of {whose} for a "
+                     "while does as well: this log cannot tell which")  # fmt: skip
+        elif s.sure:
             words = f"this log cannot tell it from what stands out {place}: {name} ({sensor})"
         else:
             by_chance = to_digits(math.exp(s.log_p), 1)
@@ -214,6 +220,12 @@ def _in_its_place(s: Stands) -> list[OtherFit]:
     """What fits as well and can be so for a while, where what was named can."""
     goes = s.inside and registry()[s.label[0]].passing
     return [fit for fit in s.instead if registry()[fit.label[0]].passing or not goes]
+
+
+def _noises(s: Stands) -> Iterator[OneWay]:
+    """Slow noise that does there as well, of which nothing says that it is beyond the figure."""
+    for role in s.noise_of:
+        yield OneWay((Departing(factor_effect().name, (role,), s.stage, {}),))
 
 
 def _built_in(s: Stands) -> str:

@@ -35,6 +35,7 @@ from syncline_design.diagnosis.noise import (
     white_covariance,
 )
 from syncline_design.diagnosis.one_course import OneCourse, one_course
+from syncline_design.diagnosis.or_noise import noise_instead
 from syncline_design.diagnosis.scores import clean_errors
 from syncline_design.diagnosis.spans import StampSpan, cut_to, cuttable
 from syncline_design.diagnosis.stretch_ends import ends
@@ -75,6 +76,7 @@ class Stands:
     anywhere; sure: whether that is beyond doubt; instead: what fits there as well.  inside:
     whether it begins and ends within the log, as what is built in does not.  margin_s: by which its
     ends may be off.  share: RMS that it makes in the log, over what the spec's noise makes.
+    noise_of: the sensors whose slow noise does there as well; none of a constant beyond doubt.
     """
 
     label: Label
@@ -90,6 +92,7 @@ class Stands:
     inside: bool = False
     margin_s: float = 0.0
     share: float = 0.0
+    noise_of: tuple[str, ...] = ()
 
     @property
     def others(self) -> tuple[Label, ...]:
@@ -170,7 +173,24 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -
         hits += _hits(s, sums, windows)
         if s.candidate.effect.breaks in ASKED:
             reaches += _reaches(data, s, sums, windows)
-    return Stretches(tuple(_stands(data, model, asked, hits)), tuple(reaches))
+    stands = (_beside_noise(data, whitened, asked, *one)
+              for one in _stands(data, model, asked, hits))  # fmt: skip
+    return Stretches(tuple(stands), tuple(reaches))
+
+
+def _beside_noise(
+    data: Data, whitened: tuple[Array, Array], asked: Sequence[Signature], found: Stands,
+    scale2: float,
+) -> Stands:  # fmt: skip
+    """What stands out beyond doubt, with the sensors whose slow noise does there as well."""
+    if not found.sure:
+        return found
+    root, every = whitened
+    labels = (found.label, *found.others)
+    own = sorted((s for s in asked if s.candidate.label in labels),
+                 key=lambda s: labels.index(s.candidate.label))  # fmt: skip
+    whose = noise_instead(data, (root, every[0]), own, (found.from_s, found.to_s), scale2)
+    return replace(found, noise_of=whose)
 
 
 def left_as_one(data: Data, model: Model, known: Sequence[Signature]) -> OneCourse | None:
@@ -239,8 +259,8 @@ def _hits(s: Signature, sums: BlockSums, windows: Sequence[Windows]) -> Iterator
 
 def _stands(
     data: Data, model: Model, asked: Sequence[Signature], hits: Sequence[_Hit]
-) -> Iterator[Stands]:
-    """The clearest window, named; then the clearest elsewhere, and so on."""
+) -> Iterator[tuple[Stands, float]]:
+    """The clearest window, named, with its length's noise; then that elsewhere, and so on."""
     left = sorted(hits, key=lambda one: one.log_p)
     while left:
         best = left[0]
@@ -248,7 +268,7 @@ def _stands(
             best = _to_the_row(data, model, best)
         named = _named(data, model, asked, best)
         if named is not None:
-            yield named
+            yield named, best.scale2
         left = [one for one in left if one.to_s < best.from_s or best.to_s < one.from_s]
 
 
