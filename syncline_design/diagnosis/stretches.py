@@ -34,8 +34,8 @@ from syncline_design.diagnosis.noise import (
     precision,
     white_covariance,
 )
+from syncline_design.diagnosis.noise_instead import noise_instead
 from syncline_design.diagnosis.one_course import OneCourse, one_course
-from syncline_design.diagnosis.or_noise import noise_instead
 from syncline_design.diagnosis.scores import clean_errors
 from syncline_design.diagnosis.spans import StampSpan, cut_to, cuttable
 from syncline_design.diagnosis.stretch_ends import ends

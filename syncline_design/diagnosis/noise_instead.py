@@ -18,9 +18,8 @@ from syncline_design.diagnosis.noise_course import CourseRows, over_noise
 from syncline_design.diagnosis.stretch_windows import PLACES
 from syncline_design.effects.record import Array
 
-AS_GOOD_NATS: Final = (
-    4.5  # within which a constant is not told from noise, nor one noise from another
-)
+# Within these a constant is not told from noise, nor one noise from another.
+AS_GOOD_NATS: Final = 4.5
 
 
 def noise_instead(
