@@ -20,7 +20,9 @@ from checked import check_file
 from command import run
 from plain_enumeration import Enumeration, Outcome, number, read_catalog
 from syncline_design.machine.records import read_as
+from syncline_design.report import numbers
 from syncline_design.report.checks import render_checks
+from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.verdict.tree import Verdict
@@ -155,6 +157,17 @@ def test_every_output_says_each_mission(shipped: Verdict) -> None:
         assert "Missions" in text
         assert all(name in text for name in names)
         assert "A payload for each mission" in text
+
+
+def test_the_error_that_leads_is_of_the_mission_nearest_its_limit(shipped: Verdict) -> None:
+    """A headline of the mission whose timing is tightest would show less than what was required."""
+    rows = [(one.name, row) for one in shipped.missions or () for row in one.requirements]
+    near = [(row.value / row.limit, name, row) for name, row in rows
+            if row.kind == "accuracy" and row.value is not None]  # fmt: skip
+    _, name, row = max(near, key=lambda one: one[0])
+    facts = dict(on_verdict(shipped).facts)
+    assert facts[f"Syncline error, {name}"].startswith(numbers.error(row.value, row))
+    assert not any(label == "Syncline error" for label in facts)
 
 
 @pytest.mark.parametrize("far", ["", ", ranging: {candidates: [hesai_xt32m]}"])

@@ -51,7 +51,7 @@ from syncline_design.report.simulated import (
 from syncline_design.report.table import Table
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.tree import Checked, Refused, Verdict
+    from syncline_design.verdict.tree import Checked, MissionVerdict, Refused, Verdict
 
 OPEN = ("infeasibility", "requirements", "missions", "baseline", "explained", "warnings")
 MOST_OPEN = 12  # rows of a table of the choice that is not folded away
@@ -139,28 +139,47 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     if design is not None and design.cost is not None:
         currency = verdict_tables.currency_of(verdict)
         facts.append(("Price", numbers.money(design.cost, currency)))
-    limit = verdict_charts.tightest_limit(verdict, "accuracy")
-    if verdict.syncline is not None:
-        error = numbers.error(verdict.syncline.total_m, limit)
+    judged, where = _hardest(verdict)
+    limit = verdict_charts.tightest_limit(judged, "accuracy")
+    if judged.syncline is not None:
+        error = numbers.error(judged.syncline.total_m, limit)
         asked = "" if limit is None else f" of {numbers.limit(limit)}"
-        facts.append(("Syncline error", error + asked))
-    figures = verdict.figures
+        facts.append((f"Syncline error{where}", error + asked))
+    figures = judged.figures
     if figures is not None and figures.quantile95_3d_m is not None:
-        facts.append(("95 % of errors within", numbers.error(figures.quantile95_3d_m, limit)))
+        facts.append(
+            (f"95 % of errors within{where}", numbers.error(figures.quantile95_3d_m, limit))
+        )
     if figures is not None and figures.worst_case_m is not None:
-        at = f"Worst case at {numbers.number(figures.worst_case_k, 6)} \u03c3"
+        at = f"Worst case at {numbers.number(figures.worst_case_k, 6)} \u03c3{where}"
         facts.append((at, numbers.error(figures.worst_case_m, limit)))
     row = verdict_words.tightest(verdict.requirements)
     if row is not None:
         facts.append(("Tightest margin", f"{row.id}: {verdict_words.margin_text(row)}"))
-    within = verdict.monte_carlo and verdict.monte_carlo.probability_within_target
+    within = judged.monte_carlo and judged.monte_carlo.probability_within_target
     if within:
-        facts.append(("Simulated within limit", numbers.percent(within.value, 4)))
+        facts.append((f"Simulated within limit{where}", numbers.percent(within.value, 4)))
     if design is not None and design.mass is not None:
         facts.append(("Mass", numbers.mass(design.mass)))
     if design is not None and design.power is not None:
         facts.append(("Power", numbers.power(design.power)))
     return facts
+
+
+def _hardest(verdict: Verdict) -> tuple[Verdict | MissionVerdict, str]:
+    """Whose error leads: of several missions, that which comes nearest to its accuracy limit, of
+    equally near ones, or where none has a limit, the largest; and its name for the labels."""
+    missions = [one for one in verdict.missions or () if one.syncline is not None]
+    if not missions:
+        return verdict, ""
+
+    def used(one: MissionVerdict) -> tuple[float, float]:
+        limit = verdict_charts.tightest_limit(one, "accuracy")
+        total = 0.0 if one.syncline is None else one.syncline.total_m
+        return (0.0 if limit is None else total / limit.limit), total
+
+    hardest = max(missions, key=used)
+    return hardest, f", {hardest.name}"
 
 
 def problems(refused: Refused) -> list[Node]:

@@ -18,12 +18,14 @@ if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
     from syncline_design.verdict.named import CloudDesign
     from syncline_design.verdict.syncline_figures import SynclineFigures
-    from syncline_design.verdict.tree import RequirementResult, Verdict
+    from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Verdict
 
 # What draws is imported where it draws: ElementTree and matplotlib hide behind it.
 
 
-def tightest_limit(verdict: Verdict | Summary, kind: str) -> RequirementResult | None:
+def tightest_limit(
+    verdict: Verdict | Summary | MissionVerdict, kind: str
+) -> RequirementResult | None:
     """The requirement with the tightest limit of a kind."""
     rows = (row for row in verdict.requirements if row.kind == kind)
     return min(rows, key=lambda row: row.limit, default=None)
