@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from once import SHARED
 
@@ -32,6 +33,15 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
     _bytecode = tempfile.mkdtemp(prefix="bytecode-")
     os.environ["PYTHONPYCACHEPREFIX"] = _bytecode
     atexit.register(shutil.rmtree, _bytecode, ignore_errors=True)
+
+# No test is timed: on a busy machine the making of examples is slow, and no fault.  All are seeded.
+settings.register_profile(
+    "any_machine",
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
+settings.load_profile("any_machine")
 
 # What the processes of a run make once for all of them (once.py): the first to start sets it.
 if SHARED not in os.environ:
