@@ -23,6 +23,8 @@ from syncline_design.machine.deadline import in_force
 
 EXACT = 2**52  # sums of whole amounts below it are exact as floats
 MOST_TRIED = 12  # options of a role near a design that does not stand
+
+Places = Sequence[int | None]  # of a design's options in another problem; None: gone
 TIED = 1e-11  # errors of one order: 12 figures
 
 
@@ -158,11 +160,7 @@ def best_with(
     fewer = core(part.problem, known, beside, held=False)
     if fewer.is_empty:
         return None
-    places = tuple(own[kept] for own, kept in zip(part.options, fewer.options, strict=True))
-    return best_of(Narrowed(fewer.problem, places, part.clocks), in_force(), known)
-
-
-Places = Sequence[int | None]  # of a design's options in another problem; None: gone
+    return best_of(fewer.within(part), in_force(), known)
 
 
 def best_from(

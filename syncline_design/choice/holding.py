@@ -98,9 +98,7 @@ def without(problem: Problem, sensor: str, chosen: Design | None = None) -> Narr
     known = standing_near(part.problem, tuple(_left_of(part, chosen)), chosen)
     if known is None:
         return part
-    fewer = core(part.problem, known, Beside(part.problem))
-    places = tuple(own[rows] for own, rows in zip(part.options, fewer.options, strict=True))
-    return Narrowed(fewer.problem, places, part.clocks)
+    return core(part.problem, known, Beside(part.problem)).within(part)
 
 
 def _left_of(part: Narrowed, design: Design) -> Iterator[int | None]:

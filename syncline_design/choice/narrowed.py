@@ -34,6 +34,16 @@ class Narrowed:
             tuple(places[i] for places, i in zip(self.clocks, design.clocks, strict=True)),
         )
 
+    def within(self, outer: Narrowed) -> Narrowed:
+        """This part of another one's problem, as a part of the whole problem."""
+        options = zip(outer.options, self.options, strict=True)
+        clocks = zip(outer.clocks, self.clocks, strict=True)
+        return Narrowed(
+            self.problem,
+            tuple(places[rows] for places, rows in options),
+            tuple(tuple(places[i] for i in rows) for places, rows in clocks),
+        )
+
 
 def narrowed(
     problem: Problem, options: Sequence[Indices], clocks: Sequence[Sequence[int]]

@@ -114,8 +114,7 @@ def _left(problem: Problem, most: Incumbent, beside: Beside) -> Narrowed:
         at_hand = same_design(problem, most.design, inner)
         assert at_hand is not None
         fewer = core(inner, replace(most, design=at_hand), beside)
-        places = tuple(own[rows] for own, rows in zip(left.options, fewer.options, strict=True))
-        left = Narrowed(fewer.problem, places, left.clocks)
+        left = fewer.within(left)
         if fewer.problem.combinations == inner.combinations:
             break
     return left

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.cells import ISO, NOTHING
-from syncline_design.logs.refusals import refuse
+from syncline_design.logs.refusals import left_out, refuse
 from syncline_design.machine.csv_cells import cells_of
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
@@ -237,10 +237,7 @@ class Losses:
         if self.first is None:
             return ""
         (flaw,) = self.first.problems
-        if self.count == 1:
-            return f"1 damaged line was left out, line {flaw.line}: {flaw.message}"
-        lines = f"{self.count} damaged lines were left out"
-        return f"{lines}, the first of them line {flaw.line}: {flaw.message}"
+        return left_out(self.count, flaw.line, flaw.message)
 
 
 def blocks(path: Path, how: Dialect, end: int, losses: Losses | None = None) -> Iterator[RowBlock]:

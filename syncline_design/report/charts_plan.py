@@ -60,9 +60,7 @@ def path(run: PlanRun) -> InlineChart:
     return draw("fig-path", "Path from above", spoken, (WIDTH, 340.0), build)
 
 
-def beside(
-    at: tuple[float, float], drawn: np.ndarray, apart: float
-) -> tuple[float, float]:  # fmt: skip
+def beside(at: tuple[float, float], drawn: np.ndarray, apart: float) -> tuple[float, float]:
     """Of places around a point, `apart` from it [m], the one farthest from all that is drawn."""
     angles = np.arange(16) * math.pi / 8.0
     around = np.array(at) + apart * np.c_[np.cos(angles), np.sin(angles)]

@@ -220,10 +220,8 @@ def _turned(run: PlanRun, ways: list[tuple[int, int]], yaw: Any) -> Iterator[tup
         to = math.degrees(yaw[k])
         if abs(to - told) < SAME_DEG:
             continue
-        turn, lasts = (
-            to - math.degrees(yaw[before]),
-            float(run.path.time_s[k] - run.path.time_s[before]),
-        )
+        turn = to - math.degrees(yaw[before])
+        lasts = float(run.path.time_s[k] - run.path.time_s[before])
         rate = round(abs(turn) / lasts, 1) if lasts > 0.0 else 0.0
         way = 0 if abs(turn) < SAME_DEG else math.copysign(1, turn)
         yield k, [_item(HEADING, [round(to % 360.0, 1), rate, way, 0, 0, 0, 0], MISSION)]

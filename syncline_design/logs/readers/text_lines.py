@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from syncline_design.logs.refusals import refuse
+from syncline_design.logs.refusals import left_out, refuse
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
 
@@ -55,9 +55,7 @@ class Damage:
         """For people; empty where every line was read."""
         parts = []
         if self.first is not None and self.error is not None:
-            lines = "1 damaged line was" if self.count == 1 else f"{self.count} damaged lines were"
-            which = "" if self.count == 1 else ", the first of them"
-            parts.append(f"{lines} left out{which} line {self.first.number}: {self.error.message}")
+            parts.append(left_out(self.count, self.first.number, self.error.message))
         if self.cut:
             parts.append(f"the last line is cut: {self.cut[:40]!r}")
         return "; ".join(parts)
