@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import json
 import random
 import resource
 import subprocess
 import sys
+import tempfile
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -38,7 +40,6 @@ from syncline_design.spec.load import load
 from test_front_ties import ROLES, as_problem, coarse_options, plain_designs
 
 SPECS = Path(__file__).parent.parent / "specs"
-STARTUP_S = 3.0  # processor time of an interpreter, of reading and of drawing a page, and to spare
 
 CHAIN = """\
 syncline: 1
@@ -88,6 +89,19 @@ def run(*words: str, most_bytes: int | None = None) -> tuple[int, float, str]:
     return done.returncode, used, done.stderr
 
 
+@functools.cache
+def startup_s() -> float:
+    """Processor time of an interpreter, of reading and of drawing a page, twice for what varies.
+
+    Measured where it is asked for: machines differ by a factor of four.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        page = f"html:{folder}/page.html"
+        code, used, complaint = run("check", str(SPECS / "uav_corridor.yaml"), "-q", "-o", page)
+    assert code == 0, complaint
+    return 2.0 * used
+
+
 @pytest.mark.parametrize(
     "words", [("optimize", "--best", "6", "--pareto"), ("check",)], ids=["optimize", "check"]
 )
@@ -102,7 +116,7 @@ def test_limit_binds_the_command_in_bounded_memory(
     pages = ("-o", f"html:{tmp_path / 'page.html'}", "-o", f"json:{out}")
     given = (*words, str(chain), "--time-limit", "1.5", "--quiet", *pages)
     code, used, complaint = run(*given, most_bytes=3 * 2**30)
-    assert used < 1.5 + STARTUP_S, used
+    assert used < 1.5 + startup_s(), used
     assert "Traceback" not in complaint
     assert code in (0, 3)  # 3: no design by then, on a very busy machine
     if code == 0:
@@ -242,9 +256,12 @@ def test_unproven_design_ends_zero_and_says_so(
 def test_several_specs_share_one_limit(chain: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.json"
     specs = [str(SPECS / "position_track.yaml"), str(chain), str(SPECS / "uav_corridor.yaml")]
-    code, used, _ = run("check", *specs, "--time-limit", "0", "-q", "-o", f"json:{out}")
+    code, used, complaint = run("check", *specs, "--time-limit", "0", "-q", "-o", f"json:{out}")
     assert code == 3
-    assert used < STARTUP_S
+    assert used < startup_s()
+    if "nothing can be concluded" in complaint:  # a slow machine, ended while it was reading
+        assert not out.exists()
+        return
     words = [v["verdict"] for v in json.loads(out.read_text("utf-8"))["verdicts"]]
     assert words[1:] == ["indeterminate", "indeterminate"]
 

@@ -12,7 +12,7 @@ import yaml
 
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.machine.deadline import Deadline, OutOfTime, within
-from test_time_limit import STARTUP_S, run
+from test_time_limit import run, startup_s
 
 SENSORS, METHODS, STAGES = 12, 9, 3
 
@@ -86,7 +86,7 @@ def test_limit_binds_where_several_amounts_are_limited(limited: Path, tmp_path: 
     out = tmp_path / "out.json"
     given = ("optimize", str(limited), "--time-limit", "2", "--quiet", "-o", f"json:{out}")
     code, used, complaint = run(*given)
-    assert used < 2.0 + STARTUP_S, used
+    assert used < 2.0 + startup_s(), used
     assert "Traceback" not in complaint
     data = json.loads(out.read_text("utf-8"))
     assert (code, data["verdict"]) in {(0, "meets"), (3, "indeterminate")}
