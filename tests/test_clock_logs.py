@@ -348,7 +348,7 @@ def test_quantiles_are_of_time_not_of_samples(tmp_path: Path) -> None:
 
 REFUSED = {
     "empty": (b"", "an empty file"),
-    "binary": (b"abc\x00\x01\x02" * 50, "not a text file"),
+    "binary": (b"abc\x00\x01\x02" * 50, "not text"),
     "xz": (b"\xfd7zXZ\x00" + bytes(50), "packed with xz"),
     "prose": (b"Lorem ipsum dolor sit amet\n" * 50, "no clock log that is known"),
     "headers": ("\n".join([made.BANNER, "   Date (UTC) Time", made.BANNER]).encode(), "no samples"),
@@ -484,4 +484,5 @@ def test_figures_that_are_none_are_damaged_lines(tmp_path: Path) -> None:
     path = write(tmp_path / "tracking.log", lines)
     read = read_logs([path])
     assert len(read.series[0]) == 58
-    assert read.notes == (f"{path}: 2 damaged lines left out, the first at 11",)
+    said = "2 damaged lines were left out, the first of them line 11: no line of this log"
+    assert read.notes == (f"{path}: {said}",)

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from syncline_design.logs.readers import open_recording
+from syncline_design.logs.readers.decimal_stamps import calendar_ns
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.spec.load import BadInput
 
@@ -51,12 +53,20 @@ def dated(k: int) -> str:
     return f"2023-07-10T12:00:{k:02d}.250Z;35,{k:04d};136,8814;41,4"
 
 
+def report(k: int) -> str:
+    return (
+        f'{{"class":"TPV","mode":3,"time":"2023-07-10T12:00:{k:02d}.250Z","lat":35.{k:04d},'
+        '"lon":136.8814,"altHAE":41.4,"track":30.0,"speed":2.0,"climb":0.5}'
+    )
+
+
 FORMATS: dict[str, tuple[list[str], Callable[[int], str]]] = {
     "solution": (["% program : RTKPOST", TITLE], solution),
     "solution without header": ([], solution),
     "TUM": ([], tum),
     "EuRoC": ([], euroc),
     "KITTI": ([], kitti),
+    "gpsd": ([], report),
     "CSV": (["time_s,latitude_deg,longitude_deg,height_m"], table),
     "CSV of dates": (["time;latitude_deg;longitude_deg;height_m"], dated),
 }
@@ -202,6 +212,32 @@ def test_looking_for_damaged_rows_takes_no_longer_than_it_may(
         (stream,) = written(tmp_path / "run.csv", [b"stamp_s,receive_s", *rows]).streams()
         assert stream.messages == 100_000 - 100_000 // every
     assert time.process_time() - began < 20.0
+
+
+@pytest.mark.parametrize(
+    "time_said",
+    ['"2023-07-10T25:00:17.250Z"', '"2023-13-10T12:00:17.250Z"', '"nan"', '""', "1688990417.25"],
+)
+def test_a_bad_time_of_a_report_costs_that_report(tmp_path: Path, time_said: str) -> None:
+    rows = lines("gpsd")
+    rows[17] = rows[17].replace(b'"2023-07-10T12:00:17.250Z"', time_said.encode())
+    recording = written(tmp_path / "run.json", rows)
+    assert told(recording) == [k for k in range(COUNT) if k != 17]
+    assert recording.incomplete is not None
+    assert "line 18: no time of a report" in recording.incomplete.reason
+
+
+@pytest.mark.parametrize("zone", ["Z", "", "+05:30", "-0130", "+01"])
+@pytest.mark.parametrize("day", ["1995-02-28", "2024-02-29", "2026-12-31"])
+def test_calendar_times_are_those_of_the_calendar(day: str, zone: str) -> None:
+    """Against the library's own calendar, to nanoseconds that it does not hold."""
+    at = datetime.fromisoformat(f"{day}T23:59:58{zone or 'Z'}")
+    found = calendar_ns(f"{day}T23:59:58.123456789{zone}")
+    assert found == int(at.timestamp()) * SECOND + 123_456_789
+    assert calendar_ns(f"{day}T23:59:60{zone}") == (int(at.timestamp()) + 2) * SECOND
+    for wrong in (f"{day}T24:00:00", f"{day[:-2]}32T00:00:00", day, ""):
+        with pytest.raises(ValueError, match=r"not a time|day is out of range|day .* must be"):
+            calendar_ns(wrong)
 
 
 def test_a_header_settles_how_many_fields_where_rows_disagree(tmp_path: Path) -> None:

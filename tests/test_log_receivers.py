@@ -361,6 +361,7 @@ def test_damaged_reports_are_counted(tmp_path: Path) -> None:
     recording = opened(tmp_path, TPV.encode(), TPV.encode()[:70] + b"\n", TPV.encode()[:-20])
     assert by_name(recording)["TPV"].messages == 1
     assert recording.incomplete is not None
-    assert "2 lines" in recording.incomplete.reason
+    assert recording.incomplete.reason.startswith("1 damaged line was left out, line 2: no report")
+    assert "the last line is cut" in recording.incomplete.reason
     with pytest.raises(BadInput, match="no time of a report"):
         opened(tmp_path, TPV.replace("10:00", "25:00").encode()).streams()

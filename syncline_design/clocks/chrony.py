@@ -15,6 +15,7 @@ from syncline_design.clocks.series import Row, SourceKind
 
 _STAMP: Final = re.compile(r"(\d{4})-(\d\d)-(\d\d)$")
 _CLOCK: Final = re.compile(r"(\d\d):(\d\d):(\d\d(?:\.\d+)?)$")
+_DATED: Final = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d")
 _LEAPS: Final = frozenset("N+-?")
 _TESTS: Final = re.compile(r"[01]{3}")
 _DISTANT_SKEW: Final = 1e5  # ppm; chronyd starts with 1e6 where no drift file says better
@@ -26,7 +27,7 @@ TRACKING: Final = SourceKind("chrony tracking", "chrony", 1, "servo", "utc")
 def row(line: str) -> tuple[SourceKind, Row, str] | None:
     """A line of any of the four logs: source, row, the reference it names; None: no such line."""
     cells = line.split()
-    if len(cells) < 9:
+    if len(cells) < 9 or _DATED.search(line.lstrip(), 1):  # cut, and the next line joined to it
         return None
     time_s = stamp(cells[0], cells[1])
     if time_s is None:

@@ -9,14 +9,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Final
 
 from syncline_design.clocks import rollover
+from syncline_design.clocks.damage import DamagedLines
 from syncline_design.clocks.files import LogFile, refused
 from syncline_design.clocks.series import FARTHEST_S, Row, Sheet, SourceKind
 from syncline_design.machine.csv_cells import NotCellsError, cells_of
 from syncline_design.machine.deadline import in_force
+from syncline_design.spec.load import BadInput
 
 _UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "\N{MICRO SIGN}s": 1e-6,
                  "\N{GREEK SMALL LETTER MU}s": 1e-6, "ns": 1e-9, "ps": 1e-12}  # fmt: skip
@@ -44,31 +47,26 @@ def read(file: LogFile) -> tuple[list[Sheet], list[str]]:
                 if line.strip() and not line.startswith("#"))  # fmt: skip
     line, header = next(numbered)
     mark = _mark(header)
-    columns = _columns(file, [c.strip() for c in cells_of(header, mark)], line)
-    comma = mark != ","
+    names = [c.strip() for c in cells_of(header, mark)]
+    columns = _columns(file, names, line)
     sheet = Sheet(SourceKind("CSV", "csv", 1, "unknown", "utc"))
     stamps_utc = True
-    session: str | None = None
     empty: list[int] = []
-    for number, cells in _split(numbered, mark, file):
-        if len(cells) <= max(columns.values()):
-            if number == len(file.lines):
-                break  # cut off while it was written
-            raise refused(file.path, "a row has not the header's cells", line=number,
-                          expected=f"{max(columns.values()) + 1} cells or more",
-                          found=str(len(cells)))  # fmt: skip
-        at = _Cells(file, number, cells, columns, comma)
-        row, own = at.row(session)
+    damage = replace(file.no_text)
+    for number, row in _rows(file, numbered, mark, columns, len(names), damage):
         if row is None:
             empty.append(number)
         else:
             stamps_utc &= row.time_s > _EARLIEST_UTC
             sheet.add(row)
-            session = own
+    # many rows that are not as the header says are how the table was written, and no damage
+    damage.demand_few(len(sheet.figures) // len(Row._fields) + len(empty), least=0)
     if not sheet.figures:
         raise refused(file.path, "no samples", expected="rows below the header", line=line)
-    said = [f"{file.path}: {len(empty)} rows without time or offset left out, the first in line "
-            f"{empty[0]}"] if empty else []  # fmt: skip
+    said = damage.said(file.path)
+    if empty:
+        said.append(f"{file.path}: {len(empty)} rows without time or offset left out, the first in "
+                    f"line {empty[0]}")  # fmt: skip
     if not stamps_utc:
         sheet.kind = SourceKind("CSV", "csv", 1, "unknown", "boot")
         said += [f"{file.path}: {text}" for text in _count_on(sheet)]
@@ -84,17 +82,38 @@ def _count_on(sheet: Sheet) -> list[str]:
     return [rollover.said(found)]
 
 
-def _split(
-    numbered: Iterator[tuple[int, str]], mark: str, file: LogFile
-) -> Iterator[tuple[int, list[str]]]:
+def _rows(
+    file: LogFile, numbered: Iterator[tuple[int, str]], mark: str, columns: dict[str, int],
+    width: int, damage: DamagedLines,
+) -> Iterator[tuple[int, Row | None]]:  # fmt: skip
+    """Every row by its line, None where it lacks a value; what is none goes to the damage."""
+    session: str | None = None
     check: Callable[[], None] = in_force().check
     for count, (number, line) in enumerate(numbered):
         if not count % 4096:
             check()
         try:
-            yield number, cells_of(line, mark)
-        except NotCellsError as error:
-            raise refused(file.path, f"not a row: {error}", line=number) from None
+            cells = _split(file, number, line, mark, columns, width)
+            row, session = _Cells(file, number, cells, columns, mark != ",").row(session)
+        except BadInput as error:
+            damage.add(error)
+        else:
+            yield number, row
+
+
+def _split(
+    file: LogFile, number: int, line: str, mark: str, columns: dict[str, int], width: int
+) -> list[str]:  # fmt: skip
+    """The cells of a row: those that are needed, and none but blank ones beyond the header's."""
+    try:
+        cells = cells_of(line, mark)
+    except NotCellsError as error:
+        raise refused(file.path, f"not a row: {error}", line=number) from None
+    least = max(columns.values()) + 1
+    if len(cells) < least or any(cell.strip() for cell in cells[width:]):
+        raise refused(file.path, "a row has not the header's cells", line=number,
+                      expected=f"{least} to {width} cells", found=str(len(cells)))  # fmt: skip
+    return cells
 
 
 def _columns(file: LogFile, names: Sequence[str], line: int) -> dict[str, int]:

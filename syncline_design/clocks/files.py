@@ -6,9 +6,11 @@ import hashlib
 import re
 import zlib
 from collections.abc import Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import Final
 
+from syncline_design.clocks.damage import DamagedLines
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import UnsuitableError, read_plain
 from syncline_design.machine.quick_dataclass import dataclass
@@ -41,8 +43,9 @@ def refused(
 class LogFile:
     """One file as text.
 
-    log: name shared by all rotations of one log; order: theirs, the oldest first.  cut_short: what
-    is missing at its end, in words.
+    lines: by their number; a line that is no text is left empty.  log: name shared by all rotations
+    of one log; order: theirs, the oldest first.  cut_short: what is missing at its end, in words.
+    no_text: those lines.
     """
 
     path: Path
@@ -51,6 +54,7 @@ class LogFile:
     log: str
     order: tuple[int, str]
     cut_short: str = ""
+    no_text: DamagedLines = field(default_factory=DamagedLines)
 
 
 def read_files(paths: Sequence[Path]) -> list[LogFile]:
@@ -88,9 +92,9 @@ def _read(path: Path) -> LogFile:
     if not text.endswith(_ENDS) and not _is_whole(lines):
         lines = lines[:-1]
         cut_short = cut_short or "the last line is cut off and left out"
-    _demand_lines(path, lines)
+    lines, no_text = _lines_of_text(path, lines)
     log, order = _rotation(path)
-    return LogFile(path, digest, lines, log, order, cut_short)
+    return LogFile(path, digest, lines, log, order, cut_short, no_text)
 
 
 def _is_whole(lines: Sequence[str]) -> bool:
@@ -130,18 +134,29 @@ def _unpacked(path: Path, content: bytes) -> tuple[bytes, str]:
 def _text(path: Path, content: bytes) -> str:
     if not content.strip():
         raise refused(path, "an empty file", expected="lines of a clock's log")
-    if b"\x00" in content[: 2**20]:
-        line = content[: content.index(b"\x00")].count(b"\n") + 1
-        raise refused(path, "not a text file", line=line, found="NUL")
     return content.decode("utf-8-sig", errors="replace")
 
 
-def _demand_lines(path: Path, lines: Sequence[str]) -> None:
+def _lines_of_text(path: Path, lines: Sequence[str]) -> tuple[tuple[str, ...], DamagedLines]:
+    """The lines, those that are no text left empty, and the damage that these are."""
+    found, damage = list(lines), DamagedLines()
     for number, line in enumerate(lines, 1):
-        if len(line) > MOST_LINE:
-            most = f"at most {MOST_LINE} characters"
-            raise refused(path, "a line too long", line=number, expected=most,
-                          found=str(len(line)))  # fmt: skip
+        if flaw := no_text(path, line, number):
+            found[number - 1] = ""
+            damage.add(flaw)
+    if damage.first is not None and not any(line.strip() for line in found):
+        raise damage.first
+    return tuple(found), damage
+
+
+def no_text(path: Path, line: str, number: int) -> BadInput | None:
+    """Why a line is none of text; None where it is."""
+    if "\x00" in line:
+        return refused(path, "not text: NUL", line=number)
+    if len(line) > MOST_LINE:
+        most = f"at most {MOST_LINE} characters"
+        return refused(path, "a line too long", line=number, expected=most, found=str(len(line)))
+    return None
 
 
 def _rotation(path: Path) -> tuple[str, tuple[int, str]]:

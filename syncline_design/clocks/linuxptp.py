@@ -14,7 +14,7 @@ from typing import Final
 from syncline_design.clocks.series import Row, SourceKind, Steering, TimeBase
 from syncline_design.machine.quick_dataclass import dataclass
 
-_PROGRAM: Final = re.compile(r"\b(ptp4l|phc2sys|ts2phc)(?=\[|: )")
+_PROGRAM: Final = re.compile(r"(ptp4l|phc2sys|ts2phc)(?=\[|: )")
 _STAMP: Final = re.compile(r"\[(\d{1,12}(?:\.\d+)?)\]")
 _TAG: Final = re.compile(r"\[([\w.@-]+?)(?::\d)?\]")
 _INTEGER: Final = r"([-+]?\d{1,18})"
@@ -34,7 +34,8 @@ _UNIX: Final = 1e9
 SYSTEM: Final = "phc2sys CLOCK_REALTIME"
 FOLLOWS_SYSTEM: Final = " by the system clock"  # the name's end of a card in a `sys offset` line
 RESOLUTION_S: Final = 0.5e-9  # of whole nanoseconds
-_MOST: Final = 512  # characters before and behind a program's name
+_MOST: Final = 512  # characters behind a program's name
+_NAMES: Final = 4  # of programs in one line: syslog's and the program's own, twice
 _RANKS: Final = {"phc2sys": 1, "ptp4l": 2, "ts2phc": 3}
 _STEERING: Final[dict[str, Steering]] = {
     "phc2sys": "servo",
@@ -52,9 +53,13 @@ class PtpReader:
 
     def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
         """A line of any of the three programs that holds an offset, or says that lock was lost."""
-        program = _PROGRAM.search(line[:_MOST])
-        if program is None:
-            return None
+        # the last name first: of a cut line that the next one is joined to, only that one is whole
+        named = list(_PROGRAM.finditer(line[: 2 * _MOST]))[-_NAMES:]
+        rows = (self._said(program, line) for program in reversed(named))
+        return next((row for row in rows if row is not None), None)
+
+    def _said(self, program: re.Match[str], line: str) -> tuple[SourceKind, Row, str] | None:
+        """What a line says behind a program's name."""
         rest = line[program.end() : program.end() + _MOST]
         stamps = list(_STAMP.finditer(rest))[:2]
         if not stamps:

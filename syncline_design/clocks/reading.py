@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.clocks import chrony, columns, linuxptp, ntpd, pulses
-from syncline_design.clocks.files import LogFile, read_files, refused
+from syncline_design.clocks.files import LogFile, no_text, read_files, refused
 from syncline_design.clocks.repeats import demand_once
 from syncline_design.clocks.series import FARTHEST_S, ClockSeries, Row, Sheet, SourceKind, series_of
 from syncline_design.machine.deadline import in_force
@@ -78,11 +78,12 @@ def is_clock_log(path: Path) -> bool:
             head = zlib.decompressobj(wbits=31).decompress(head, _FIRST_BYTES)
         except zlib.error:
             return False
-    if b"\x00" in head:
+    lines = [one for one in head.decode("utf-8-sig", errors="replace").splitlines() if one.strip()]
+    text = tuple(line for line in lines if no_text(path, line, 0) is None)
+    if 2 * len(text) <= len(lines):
         return False
-    lines = tuple(head.decode("utf-8-sig", errors="replace").splitlines())
     try:
-        return bool(_format(LogFile(path, "", lines, "", (0, ""))))
+        return bool(_format(LogFile(path, "", text, "", (0, ""))))
     except BadInput:
         return False
 
@@ -93,15 +94,17 @@ def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:
         return columns.read(file)
     read = _LINE_READERS[name]()
     found: dict[str, Sheet] = {}
-    strange: list[int] = []
-    total = 0
+    damage = replace(file.no_text)
+    journal = name in _JOURNALS
+    last = total = 0
     for number, line in enumerate(file.lines, 1):
         if not number % 4096:
             in_force().check()
         parsed = read(line)
         if parsed is None or not _is_finite(parsed[1]):
-            if not _is_decoration(line) and not chrony.is_repeat(line):
-                strange.append(number)
+            if not journal and not _is_decoration(line) and not chrony.is_repeat(line):
+                damage.add(_strange(file, number))
+                last = number
             continue
         kind, row, reference = parsed
         sheet = found.setdefault(kind.name, Sheet(kind))
@@ -111,9 +114,11 @@ def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:
         total += 1
         if total > MOST_ROWS:
             raise refused(file.path, "too many lines", line=number, expected=f"at most {MOST_ROWS}")
-    if name in _JOURNALS:
-        return list(found.values()), []
-    return list(found.values()), _strange(file, strange, total)
+    if last == len(file.lines) and damage.count == 1:
+        return list(found.values()), [f"{file.path}: the last line is cut off and left out"]
+    if not journal:  # in one, damaged lines count among those of others
+        damage.demand_few(total, least=2)
+    return list(found.values()), damage.said(file.path)
 
 
 def _is_finite(row: Row) -> bool:
@@ -122,19 +127,13 @@ def _is_finite(row: Row) -> bool:
     return abs(row.time_s) < FARTHEST_S and known and not abs(row.hard_s) >= FARTHEST_S
 
 
-def _strange(file: LogFile, strange: list[int], total: int) -> list[str]:
-    """Lines that are none of the format: the last one is cut off, a few are said, more refused."""
-    if len(strange) > max(2, total // 10):
-        raise refused(
-            file.path, "lines that are no lines of this log", line=strange[0],
-            expected="dates, sources and figures as the daemon writes them",
-            found=repr(file.lines[strange[0] - 1][:60]),
-        )  # fmt: skip
-    if strange == [len(file.lines)]:
-        return [f"{file.path}: the last line is cut off and left out"]
-    if strange:
-        return [f"{file.path}: {len(strange)} damaged lines left out, the first at {strange[0]}"]
-    return []
+def _strange(file: LogFile, line: int) -> BadInput:
+    """Why a line of a daemon's own log is none of it."""
+    return refused(
+        file.path, "no line of this log", line=line,
+        expected="dates, sources and figures as the daemon writes them",
+        found=repr(file.lines[line - 1][:60]),
+    )  # fmt: skip
 
 
 def _is_decoration(line: str) -> bool:

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.cells import ISO, NOTHING
-from syncline_design.logs.refusals import left_out, refuse
+from syncline_design.logs.refusals import refuse
 from syncline_design.machine.csv_cells import cells_of
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.sentences import left_out
 from syncline_design.spec.load import BadInput
 
 if TYPE_CHECKING:

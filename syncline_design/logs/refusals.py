@@ -22,10 +22,3 @@ def refuse(
     """The error for a log that cannot be read."""
     problem = Flaw(str(path), line, column, field, message, expected, found, hint)
     return BadInput((problem,))
-
-
-def left_out(count: int, line: int, message: str) -> str:
-    """Damaged lines that were left out, the first of them and what is wrong with it, in words."""
-    if count == 1:
-        return f"1 damaged line was left out, line {line}: {message}"
-    return f"{count} damaged lines were left out, the first of them line {line}: {message}"

@@ -21,3 +21,10 @@ def or_rivals(names: Iterable[str]) -> str:
     """What a log does not tell from what was just said; empty where there is none."""
     listed = " or ".join(names)
     return f" (or {listed}: this log cannot tell)" if listed else ""
+
+
+def left_out(count: int, line: int, message: str) -> str:
+    """Damaged lines that were left out, the first of them and what is wrong with it, in words."""
+    if count == 1:
+        return f"1 damaged line was left out, line {line}: {message}"
+    return f"{count} damaged lines were left out, the first of them line {line}: {message}"

@@ -1,4 +1,4 @@
-"""Times written in decimals, to whole nanoseconds without passing through floats.
+"""Times in decimals or of a calendar, to whole nanoseconds without passing through floats.
 
 Seconds since 1970 with nine decimals have 19 digits, a float holds 16: `1403636580.838555648` would
 come back 64 ns off.
@@ -6,19 +6,22 @@ come back 64 ns off.
 
 from __future__ import annotations
 
+import re
+from datetime import date
 from decimal import Decimal, InvalidOperation
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from syncline_design.logs.cells import BadCellError
-from syncline_design.logs.readers.epochs import NANO
+from syncline_design.logs.cells import ISO, BadCellError
+from syncline_design.logs.readers.epochs import DAY_NS, NANO, UNIX_DAY, held
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 
 if TYPE_CHECKING:
     import polars as pl
 
 PLAIN = r"^\+?(-?)(\d{1,18})(?:[.,](\d{0,9})(\d*))?$"
+_ISO = re.compile(ISO)
 DIGITS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 MOST = 2**63
 _LOOKED_AT = 200  # figures that tell a column's unit
@@ -41,6 +44,29 @@ def nanoseconds(text: str | bytes, unit: str = "s", power: int = 0) -> int:
         return UNSET
     found = int((figure.scaleb(DIGITS[unit] - 3 * power)).to_integral_value())
     return found if -MOST <= found < MOST else UNSET
+
+
+def calendar_ns(text: str) -> int:
+    """An ISO 8601 date and time as nanoseconds since 1970; ValueError where it is none.
+
+    Without a zone it is UTC, a second 60 is the one after 59, and what 64 bits do not hold `UNSET`.
+    """
+    found = _ISO.match(text.strip()[:60])
+    if found is None:
+        raise ValueError(f"not a time: {text[:40]!r}")
+    year, month, day, hour, minute, second = map(int, found.groups()[:6])
+    if hour > 23 or minute > 59 or second > 60:
+        raise ValueError(f"not a time of day: {text[:40]!r}")
+    days = date(year, month, day).toordinal() - UNIX_DAY
+    seconds = 3600 * hour + 60 * minute + second - _ahead_s(found[8])
+    return held(days * DAY_NS + seconds * NANO + int((found[7] or "0").ljust(9, "0")))
+
+
+def _ahead_s(zone: str | None) -> int:
+    """Seconds by which `Z`, `+01:00` or `+01` is ahead of UTC."""
+    digits = (zone or "").strip("Zz+-").replace(":", "").ljust(4, "0")
+    ahead = 3600 * int(digits[:2]) + 60 * int(digits[2:])
+    return -ahead if zone and zone.startswith("-") else ahead
 
 
 def power_of(text: pl.Series, unit: str) -> int:

@@ -9,7 +9,7 @@ without their week or their day are `unknown`; the name of the stamp says from w
 from __future__ import annotations
 
 from bisect import bisect_right
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 
 NANO = 1_000_000_000
 WEEK_S = 604_800
+UNIX_DAY = date(1970, 1, 1).toordinal()
 DAY_NS = 86_400 * NANO
 WEEK_NS = WEEK_S * NANO
 GPS_EPOCH_S = 315_964_800  # 1980-01-06 00:00 as a calendar reads it, s since 1970-01-01

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import Any
@@ -17,12 +17,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.cells import NO_TIME, BadCellError, iso_times
 from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
+from syncline_design.logs.readers.decimal_stamps import calendar_ns
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader
-from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording
-from syncline_design.logs.readers.text_lines import head_lines, line_blocks
-from syncline_design.logs.refusals import refuse
+from syncline_design.logs.readers.stream import UNSET, Recording
+from syncline_design.logs.readers.text_lines import (
+    BadLineError,
+    Damage,
+    Line,
+    demand_text,
+    head_lines,
+    line_blocks,
+)
 from syncline_design.machine.quick_dataclass import dataclass
 
 SURER = BY_MAGIC + 1  # than of the NMEA that gpsd puts between its reports
@@ -41,7 +47,7 @@ VELOCITY = tuple(f"velocity_{a}_mps" for a in ("north", "east", "down"))
 
 @dataclass(slots=True)
 class _Rows:
-    times: list[str | None] = field(default_factory=list)
+    stamps: list[int] = field(default_factory=list)
     values: list[list[float]] = field(default_factory=list)
 
 
@@ -56,54 +62,35 @@ class GpsdRecording(BatchRecording):
         self._lacking: dict[str, int] = {}
 
     def _batches(self, wanted: str | None) -> Iterator[Batch]:
-        refused = total = 0
+        total, damage = 0, Damage()
         lacking: dict[str, int] = {}
         for block in line_blocks(self.path):
             held: dict[str, _Rows] = {}
-            for line in block:
-                if not line.text.startswith("{"):
-                    continue
-                report = _report(line.text)
-                if report is None:
-                    refused += 1
-                    continue
+            for report, stamp in _reports(block, damage):
                 total += 1
                 rows = held.setdefault(str(report["class"])[:40], _Rows())
-                at = report.get("time")
-                rows.times.append(at if isinstance(at, str) else None)
+                rows.stamps.append(stamp)
                 rows.values.append(_figures(report))
             for name, rows in held.items():
-                lacking[name] = lacking.get(name, 0) + rows.times.count(None)
+                lacking[name] = lacking.get(name, 0) + rows.stamps.count(UNSET)
                 if wanted is None or wanted == name:
                     yield self._batch(name, rows)
         if not total:
-            raise refuse(self.path, "no report of gpsd in the file")
+            raise damage.refusal(self.path, "no report of gpsd in the file", "one object a line")
         self._lacking = lacking
-        if refused:
-            self._cut(f"{refused} lines are damaged reports", total)
+        if damage.said():
+            self._cut(damage.said(), total)
 
     def _batch(self, name: str, rows: _Rows) -> Batch:
         stamps = None
-        if name in self._timed or any(at is not None for at in rows.times):
+        if name in self._timed or any(stamp != UNSET for stamp in rows.stamps):
             self._timed.add(name)
-            stamps = self._stamps(rows.times)
+            stamps = np.array(rows.stamps, dtype=np.int64)
         columns: dict[str, NDArray[Any]] = {}
         if name in FIELDS:
             table = np.array(rows.values, dtype=float)
             columns = {own: table[:, k] for k, own in enumerate(_names(name))}
-        return Batch(name, len(rows.times), stamps, None, columns)
-
-    def _stamps(self, times: list[str | None]) -> Nanoseconds:
-        import polars as pl
-
-        try:
-            found, _ = iso_times(pl.Series(times, dtype=pl.String))
-        except BadCellError as bad:
-            raise refuse(
-                self.path, "no time of a report", expected=bad.expected, found=repr(bad.text[:40])
-            ) from None
-        stamps: Nanoseconds = np.where(found == NO_TIME, UNSET, found)
-        return stamps
+        return Batch(name, len(rows.stamps), stamps, None, columns)
 
     def _facts(self, name: str) -> StreamFacts:
         notes = []
@@ -125,13 +112,43 @@ class GpsdRecording(BatchRecording):
         )
 
 
-def _report(text: str) -> Mapping[str, Any] | None:
-    """A line as an object with a class; None where it is damaged."""
+def _reports(block: Sequence[Line], damage: Damage) -> Iterator[tuple[Mapping[str, Any], int]]:
+    """The reports of a block with their times [ns]; what is none goes to the damage."""
+    for line in block:
+        if not line.text.startswith("{") and not line.flaw:
+            continue
+        try:
+            demand_text(line)
+            report = _report(line.text)
+            yield report, _stamp(report)
+        except BadLineError as error:
+            if line.whole:
+                damage.add(line, error)
+            else:
+                damage.cut = line.text
+
+
+def _report(text: str) -> Mapping[str, Any]:
+    """A line as an object with a class; BadLineError where it is none."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):
-        return None
-    return found if isinstance(found, dict) and isinstance(found.get("class"), str) else None
+        found = None
+    if not isinstance(found, dict) or not isinstance(found.get("class"), str):
+        raise BadLineError("no report", "one object with its class")
+    return found
+
+
+def _stamp(report: Mapping[str, Any]) -> int:
+    """When a report was made [ns]; UNSET where it does not say so."""
+    at = report.get("time")
+    if at is None:
+        return UNSET
+    try:
+        return calendar_ns(at if isinstance(at, str) else "")
+    except ValueError:
+        expected = "an ISO 8601 time such as 2026-03-01T12:00:00.125Z"
+        raise BadLineError(f"no time of a report: {str(at)[:40]!r}", expected) from None
 
 
 def _names(report: str) -> tuple[str, ...]:

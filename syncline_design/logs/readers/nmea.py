@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from dataclasses import field
 from datetime import date
 
-from syncline_design.logs.readers.epochs import DAY_NS, NANO
+from syncline_design.logs.readers.epochs import DAY_NS, NANO, UNIX_DAY
 from syncline_design.logs.readers.stream import UNSET
 from syncline_design.machine.quick_dataclass import dataclass
 
 KNOT_MPS = 1852 / 3600
 ROLLOVER_DAYS = 7168  # 1024 weeks
-UNIX_DAY = date(1970, 1, 1).toordinal()
 MOST_JUMPS = 5
 JOINED = ("PTNL", "PUBX")  # their kind stands in the second field
 # kind without talker -> field of the time of day

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers.batches import Batch, BatchRecording, StreamFacts
 from syncline_design.logs.readers.decimal_stamps import nanoseconds
-from syncline_design.logs.readers.epochs import DAY_NS, NANO, WEEK_NS, held, week_start_ns
+from syncline_design.logs.readers.epochs import DAY_NS, NANO, UNIX_DAY, WEEK_NS, held, week_start_ns
 from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import Frame, Recording, Timeline
 from syncline_design.logs.readers.text_lines import (
@@ -37,7 +37,6 @@ DATE = re.compile(r"^(\d{4})/(\d\d?)/(\d\d?)$")
 CLOCK = re.compile(r"^(\d\d?):(\d\d):(\d\d)(\.\d*)?$")
 SYSTEM = re.compile(r"\b(GPST|UTC|JST)\b")
 JST_NS = 9 * 3600 * NANO
-UNIX_DAY = date(1970, 1, 1).toordinal()
 LEAST_FIELDS = 7  # time (2), place (3), quality, satellites
 # columns behind the place, in RTKLIB's order
 BEHIND = (

@@ -10,8 +10,9 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from syncline_design.logs.refusals import left_out, refuse
+from syncline_design.logs.refusals import refuse
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.machine.sentences import left_out
 from syncline_design.spec.load import BadInput
 
 BLOCK = 1 << 20

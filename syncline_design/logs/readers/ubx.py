@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers.epochs import (
     NANO,
+    UNIX_DAY,
     WEEK_NS,
     gps_minus_utc_s,
     week_start_ns,
@@ -21,7 +22,6 @@ from syncline_design.logs.readers.epochs import (
 from syncline_design.logs.readers.stream import UNSET
 
 MS = 1_000_000
-UNIX_DAY = date(1970, 1, 1).toordinal()
 FULL_DAY_AND_TIME = 0b11  # of `valid`: validDate and validTime
 _UTC = [
     ("year", "<u2"),
