@@ -176,6 +176,23 @@ def write_german_csv(path: Path, made: Flight) -> Path:
     return path
 
 
+def write_parquet(path: Path, made: Flight) -> Path:
+    """The names of a receiver's export, times by their type."""
+    import polars as pl
+
+    globe, euler = geodetic(made.place), np.degrees(made.turn.as_euler("ZYX"))
+    columns = {"time": pl.Series(made.stamp_ns).cast(pl.Datetime("ns", time_zone="UTC"))}
+    for name, values in (
+        *zip(("Latitude (deg)", "Longitude (deg)", "height_m"), globe.T, strict=True),
+        *zip(("yaw_deg", "pitch_deg", "roll_deg"), euler.T, strict=True),
+        *zip((f"velocity_{a}_mps" for a in ("north", "east", "down")), made.velocity.T,
+             strict=True),
+    ):  # fmt: skip
+        columns[name] = pl.Series(values)
+    pl.DataFrame(columns).write_parquet(path)
+    return path
+
+
 GPS: Kind = (
     *(130, "GPS", "QBIHBcLLefffB"),
     "TimeUS,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,U",

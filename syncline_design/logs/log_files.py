@@ -61,8 +61,12 @@ def sorted_files(
     """Which files are tables, and which are recordings; raises BadInput of a table."""
     once = list(dict.fromkeys(paths))
     tables = [t for t in (_table(path, mapping, stages) for path in once) if t is not None]
-    if len(tables) < len(once):  # a trajectory beside recordings is one more of them
-        tables = [one for one in tables if not _is_trajectory(one, mapping, stages)]
+    beside = len(tables) < len(once)
+    if beside or not any("reference" in _held(one, mapping, stages) for one in tables):
+        found = [one for one in tables if _is_trajectory(one, mapping, stages)]
+        # beside recordings, or as one of two that tell places, a trajectory is a recording too
+        if beside or sum("position" in _quantities(one.path) for one in found) > 1:
+            tables = [one for one in tables if one not in found]
     read = {one.path for one in tables}
     held = tuple(_held(one, mapping, stages) for one in tables)
     survey = first_survey(tables, mapping, stages)
@@ -178,7 +182,7 @@ def _table(path: Path, mapping: Mapping[str, str], stages: Sequence[str]) -> Row
     found = si_columns(source.header, mapping, known_names(stages))
     if TIME in found and len(found) > 1:
         return source
-    return None if _is_stream(path) else source
+    return None if _quantities(path) else source
 
 
 def _is_trajectory(table: RowSource, mapping: Mapping[str, str], stages: Sequence[str]) -> bool:
@@ -186,13 +190,13 @@ def _is_trajectory(table: RowSource, mapping: Mapping[str, str], stages: Sequenc
 
     One with ranges, targets or a reference says by its columns' names which part it plays.
     """
-    if mapping or table.path.suffix.lower() in TABLES:
+    if mapping:
         return False
     found = si_columns(table.header, mapping, known_names(stages))
     parted = ("reference_", "target_", *(f"{stage}_" for stage in stages))
     if any(name.startswith(parted) or name in RANGING for name in found):
         return False
-    return _is_stream(table.path)
+    return bool(_quantities(table.path))
 
 
 def _reader_name(path: Path) -> str | None:
@@ -205,6 +209,7 @@ def _reader_name(path: Path) -> str | None:
     return next((name for name, one in registry().items() if one is reader), None)
 
 
-def _is_stream(path: Path) -> bool:
-    """Whether the columns tell anything under the names that readers know."""
-    return any(one.quantity and one.stamps for one in open_recording(path).streams())
+def _quantities(path: Path) -> frozenset[str]:
+    """What the columns tell, with times, under the names that readers know."""
+    streams = open_recording(path).streams()
+    return frozenset(what for one in streams if one.stamps for what in one.quantity)
