@@ -15,9 +15,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from syncline_design.cli.app import app
 from syncline_design.logs.readers import open_recording
 from syncline_design.spec.load import BadInput
+from tests.test_diagnose_recordings import spec
 from tests.test_log_clouds import capture, cloud, legacy, patched, udp
 from tests.test_log_dataflash import ATT, fmt, message
 from tests.test_log_dataflash import flight as dataflash
@@ -35,6 +38,10 @@ TUM = "".join(f"{1.5e9 + k:.6f} 1 2 3 0 0 0 1\n" for k in range(40)).encode()
 EUROC = "".join(f"{1403636580838555648 + k},1,2,3,1,0,0,0\n" for k in range(40)).encode()
 KITTI = ("1 0 0 4 0 1 0 5 0 0 1 6\n" * 40).encode()
 CSV = b"stamp_s,receive_s\n" + b"".join(b"%d.5,%d.6\n" % (k, k) for k in range(40))
+GPSD = b"".join(
+    b'{"class":"TPV","mode":3,"time":"2026-05-04T10:00:%02dZ","lat":47.5,"lon":8.5}\n' % k
+    for k in range(40)
+)
 NMEA = b"".join(sentence(f"GPHDT,{k}.0,T") for k in range(40))
 UBX = pvt(AT) * 40
 SBET = sbet(40).astype("<f8").tobytes()
@@ -51,6 +58,14 @@ def laz(folder: Path) -> Path:
 def packets(folder: Path) -> Path:
     frames = [(Decimal(k), udp(legacy(5 * 10**9 + k, 97_656, 9, 0), 7502)) for k in range(5)]
     return capture(folder / "made.pcap", frames)
+
+
+def parquet(folder: Path) -> Path:
+    import polars as pl
+
+    rows = np.arange(40.0)
+    pl.DataFrame({"stamp_s": rows, "receive_s": rows + 0.1}).write_parquet(folder / "made.parquet")
+    return folder / "made.parquet"
 
 
 def swapped(content: bytes, old: bytes, new: bytes, count: int = 1) -> bytes:
@@ -70,6 +85,15 @@ CASES: dict[str, tuple[bytes | Callable[[Path], Path], int | str]] = {
     "nmea/line-without-end.log": (NMEA + b"$" + b"A" * 3000, 40),
     "nmea/binary-between.log": (NMEA[:200] + bytes(range(128, 256)) + NMEA[200:], 39),
     "nmea/time-of-25-hours.log": (NMEA + sentence("GPGGA,256060.00,,,,,0,,,,,,,"), 41),
+    "gpsd/cut.json": (GPSD[:-9], 39),
+    "gpsd/hour-25.json": (swapped(GPSD, b"T10:00:07", b"T25:00:07"), 39),
+    "gpsd/nul.json": (swapped(GPSD, b"T10:00:07", b"\0" * 9), 39),
+    "gpsd/nested-deep.json": (GPSD + b'{"class":"TPV","a":' + b"[" * 60_000 + b"\n", 40),
+    "gpsd/long-figure.json": (GPSD + b'{"class":"TPV","a":' + b"9" * 60_000 + b"}\n", 40),
+    "gpsd/no-report.json": (b'{"class":"TPV"\n' * 40, "no report"),
+    "parquet/cut.parquet": (lambda f: _cut(parquet(f), 9), "no readable Parquet"),
+    "parquet/footer-of-4-GB.parquet": (lambda f: _footer(parquet(f)), "no readable Parquet"),
+    "parquet/magic-alone.parquet": (b"PAR1" * 20, "no readable Parquet"),
     "ubx/cut.ubx": (UBX[:-20], 39),
     "ubx/length-of-64-kB.ubx": (UBX + b"\xb5b\x01\x07\xff\xff" + UBX, 80),
     "ubx/checksum.ubx": (UBX[:130] + b"\x99" + UBX[131:], 39),
@@ -116,6 +140,13 @@ CASES: dict[str, tuple[bytes | Callable[[Path], Path], int | str]] = {
 }  # fmt: skip
 
 
+def _footer(path: Path) -> Path:
+    """A description at the end that claims 4 GB."""
+    content = path.read_bytes()
+    path.write_bytes(content[:-8] + struct.pack("<I", 2**32 - 1) + content[-4:])
+    return path
+
+
 def _cut(path: Path, lost: int) -> Path:
     return _cut_to(path, path.stat().st_size - lost)
 
@@ -160,6 +191,25 @@ def test_a_broken_file_ends_as_said(tmp_path: Path, name: str) -> None:
                      "pos/year-9999.pos")  # fmt: skip
     assert (recording.incomplete is None) == whole
     assert all(stream.partial != whole for stream in streams)
+
+
+@pytest.mark.parametrize("name", [name for name, (_, end) in CASES.items() if end == str(end)])
+def test_a_refused_file_writes_nothing(tmp_path: Path, name: str) -> None:
+    made, _ = CASES[name]
+    path = tmp_path / name.replace("/", "-")
+    if isinstance(made, bytes):
+        path.write_bytes(made)
+    else:
+        path = made(tmp_path)
+    rover, mapped = spec(tmp_path), tmp_path / "mapped.yaml"
+    for command in (
+        ["log", "inspect", str(path), "--spec", str(rover), "--write-spec", str(mapped)],
+        ["audit", str(path), "--spec", str(rover), "--write-spec", str(mapped)],
+    ):
+        done = CliRunner().invoke(app, command)
+        assert done.exit_code == 2, done.output
+        assert "Traceback" not in done.output
+    assert not mapped.exists()
 
 
 def _damaged(raw: bytes, rng: random.Random) -> bytes:
