@@ -195,6 +195,8 @@ def output_targets(
 
     specs = [path for path in writes if path is not None]
     try:
+        for path in reads:
+            _demand_option(path, formats)
         targets = [parse_target(text, formats, _stem(reads)) for text in output or ()]
         for path in specs:
             check_writable(path)
@@ -207,6 +209,16 @@ def output_targets(
     except (OutputError, ReplacedInputError) as error:
         refuse(f"syncline-design: {error}")
     return targets
+
+
+def _demand_option(path: Path, formats: tuple[str, ...]) -> None:
+    """Refuse a file that is none, and reads as an output whose option was forgotten."""
+    form, colon, _ = str(path).partition(":")
+    if colon and form in formats and not path.exists():
+        refuse(
+            f"syncline-design: {path}: no such file; an output takes its own option: "
+            f"--output {path}"
+        )
 
 
 def _stem(reads: Sequence[Path]) -> str:

@@ -28,17 +28,22 @@ if TYPE_CHECKING:
 Says = Sequence[Sequence[tuple[str, str]]]  # of every point: labels and values
 _FAINT, _STRONG = 0.08, 0.5  # opacity of the cheapest and the dearest cell: text stays readable
 MOST_TEXT = 8  # cells across in which the cost itself still fits
+PATCH = 24.0  # of the scale, with what is around it [SVG units]
+ACROSS = 262.0  # all cells, beside the labels of the rows [SVG units]
 
 
 def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
     """Heat map of the least cost over two factors; a cross where no case meets."""
     costs = [cost for row in heat.least_cost for cost in row if cost is not None]
+    across = len(heat.x_values)
+    whole = _room(costs) <= ACROSS / across or across > MOST_TEXT
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         for y, row in enumerate(heat.least_cost):
             for x, cost in enumerate(row):
-                _cell(axes, (x, y), cost, costs, len(row))
+                words = _amount(cost or 0.0, whole) if across <= MOST_TEXT else ""
+                _cell(axes, (x, y), cost, costs, words)
                 tell(axes, (x - 0.5, x + 0.5), (y - 0.5, y + 0.5), [
                     (heat.x, heat.x_values[x]), (heat.y, heat.y_values[y]),
                     ("Least cost", "no case is known to meet" if cost is None
@@ -51,7 +56,7 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
         _label_axis(axes, "y", heat.y_values)
         axes.set_xlabel(shortened(heat.x, 60))
         axes.set_ylabel(shortened(heat.y, 40))
-        _cost_scale(figure, costs, heat.currency)
+        _cost_scale(figure, costs, heat.currency, whole)
 
     spoken = "No case meets its requirements."
     if costs:
@@ -65,7 +70,7 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
 
 
 def _cell(
-    axes: Axes, place: tuple[int, int], cost: float | None, costs: Sequence[float], across: int
+    axes: Axes, place: tuple[int, int], cost: float | None, costs: Sequence[float], words: str
 ) -> None:
     from matplotlib.patches import Rectangle
 
@@ -81,13 +86,17 @@ def _cell(
         )
     )  # fmt: skip
     axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=SURFACE, linewidth=1.2))
-    if across <= MOST_TEXT:
-        axes.text(x, y, _thousands(cost), ha="center", va="center", color=INK,
-                  gid=f"cell-{x}-{y}")  # fmt: skip
+    axes.text(x, y, words, ha="center", va="center", color=INK, gid=f"cell-{x}-{y}")
 
 
-def _thousands(cost: float) -> str:
-    return f"{numbers.number(cost / 1000, 4)}k" if cost >= 10_000 else numbers.count(cost)
+def _amount(cost: float, whole: bool) -> str:
+    """A price in whole units of its currency, or in thousands of them."""
+    return numbers.count(cost) if whole else numbers.number(cost / 1000, 4)
+
+
+def _room(costs: Sequence[float]) -> float:
+    """What the longest of these prices takes, written out [SVG units]."""
+    return scales.LETTER * max((len(numbers.count(cost)) for cost in costs), default=0)
 
 
 def _label_axis(axes: Axes, which: str, labels: Sequence[str]) -> None:
@@ -253,19 +262,20 @@ def _strength(cost: float | None, costs: Sequence[float]) -> float:
     return _FAINT + (_STRONG - _FAINT) * (cost - min(costs)) / span
 
 
-def _cost_scale(figure: Figure, costs: Sequence[float], currency: str) -> None:
-    """Five patches from the cheapest to the dearest, labelled; nothing where all cost the same."""
+def _cost_scale(figure: Figure, costs: Sequence[float], currency: str, whole: bool = True) -> None:
+    """Patches from the cheapest to the dearest, labelled; nothing where all cost the same."""
     if len(set(costs)) < 2:
         return
     from matplotlib.patches import Rectangle
 
     low, high = min(costs), max(costs)
-    steps = [low + (high - low) * step / 4 for step in range(5)]
+    patches_across = 5 if not whole or 5 * (_room(costs) + PATCH) <= ACROSS else 3
+    steps = [low + (high - low) * k / (patches_across - 1) for k in range(patches_across)]
     patches = [
         Rectangle((0, 0), 1, 1, facecolor=SERIES[0], alpha=_strength(cost, costs), linewidth=0)
         for cost in steps
     ]
-    words = [f"{_thousands(cost)}" for cost in steps]
-    words[-1] += f" {currency}"
+    words = [_amount(cost, whole) for cost in steps]
+    words[-1] += f" {currency}" if whole else f" thousand {currency}"
     figure.legend(patches, words, loc="outside upper left", ncols=5,
                   handlelength=1.2, columnspacing=0.8, handletextpad=0.4)  # fmt: skip

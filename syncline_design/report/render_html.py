@@ -11,11 +11,12 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
+from syncline_design.report import numbers
 from syncline_design.report.columns import padded, worded
 from syncline_design.report.document import Document, Inline, Span, charts, for_output, spans
 from syncline_design.report.layout import laid_out
 from syncline_design.report.table import Table, table
-from syncline_design.report.text import unbroken, unticked, visible
+from syncline_design.report.text import dated, unbroken, unticked, visible
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
 
 _TEMPLATES: Final = "syncline_design.templates"
-MOST_VALUES: Final = 200  # rows of the table below a figure; more are shown one by one
+MOST_VALUES: Final = 200  # rows of the table below a figure; of more the first
 _LINE: Final = 30  # characters of a column that holds sentences
 _TABLET: Final = 92  # characters in a line of a table there
 _PHONE: Final = 48
@@ -97,6 +98,7 @@ def _environment() -> Environment:
     environment.tests["wide"] = lambda shown: _needed(shown) > _TABLET
     environment.tests["narrow"] = lambda shown: _needed(shown) <= _PHONE
     environment.tests["wordy"] = _is_wordy
+    environment.filters["dated"] = dated
     environment.filters["whole"] = _whole
     environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
@@ -115,8 +117,8 @@ def _spans(words: Inline) -> tuple[Span, ...]:
 
 
 def _printed(text: str) -> str:
-    """A text whose figures stay with their units, with a minus where a hyphen was typed."""
-    return unbroken(_MINUS.sub("\N{MINUS SIGN}", text))
+    """A text whose figures stay with their units, moments as people write them, minus signs."""
+    return unbroken(_MINUS.sub("\N{MINUS SIGN}", dated(text)))
 
 
 def _whole(text: str) -> Any:
@@ -144,12 +146,15 @@ def _points(figure: InlineChart) -> str:
 
 
 def _values(figure: InlineChart, caption: str) -> Table | None:
-    """The same as a table; None of a figure that says nothing, or more than anyone reads."""
-    if not 0 < len(figure.told) <= MOST_VALUES:
+    """The same as a table, as far as anyone reads; None of a figure that says nothing."""
+    if not figure.told:
         return None
+    told, every = figure.told[:MOST_VALUES], numbers.count(len(figure.told))
     labels = sorted(_labels(figure), key=lambda one: any(one not in t.says for t in figure.told))
-    columns = [worded(padded([t.says.get(label, "") for t in figure.told])) for label in labels]
-    return table(caption, labels, zip(*columns, strict=True))
+    columns = [worded(padded([t.says.get(label, "") for t in told])) for label in labels]
+    note = f"The first {MOST_VALUES} of {every}; the figure tells them all, one by one."
+    note = "" if len(told) == len(figure.told) else note
+    return table(caption, labels, zip(*columns, strict=True), note)
 
 
 def _labels(figure: InlineChart) -> list[str]:

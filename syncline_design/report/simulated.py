@@ -73,7 +73,7 @@ def quantiles(found: MonteCarlo) -> Table:
         for key, entry in found.quantiles.items()
     ]
     confidence = numbers.percent(found.confidence)
-    heads = ("Quantile", "Error #", f"{confidence} confidence interval")
+    heads = ("Quantile", "Error #", f"{confidence} confidence interval #")
     return table("Quantiles of the simulated error", heads, rows)
 
 

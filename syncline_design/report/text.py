@@ -20,6 +20,10 @@ _BESIDE: Final = ("m/s\N{SUPERSCRIPT TWO}", "deg/s\N{SUPERSCRIPT TWO}", "m/(m/s2
                   "nat", "\N{GREEK SMALL LETTER SIGMA}", "kB", "MB", "GB")  # fmt: skip
 _UNIT: Final = "|".join(map(re.escape, sorted((*UNITS, *_BESIDE), key=len, reverse=True)))
 _GAP: Final = re.compile(rf"(?<=\d) (?=\d{{3}}(?!\d)|\u00b1|(?:{_UNIT})(?!\w))|(?<=\u00b1) (?=\d)")
+_STAMP: Final = re.compile(
+    r"(?<![\w.,:/-])(\d{4}-\d\d-\d\d)T(\d\d:\d\d:\d\d(?:\.\d+)?)Z(?![\w.:/-]*\w)"
+)
+_MONEY: Final = re.compile(r"(?<![\w.])\d{4,}(?=(?:\.\d+)? [A-Z]{3}(?!\w))")
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~^$])")
 
 
@@ -70,6 +74,16 @@ def unticked(text: str) -> str:
 def unbroken(text: str) -> str:
     """A text in which no line ends inside a figure, or between it and its unit."""
     return _GAP.sub("\N{NO-BREAK SPACE}", text)
+
+
+def dated(text: str) -> str:
+    """A text whose moments a person reads, and a line may end in: `2026-09-27 14:13:20 UTC`."""
+    return _STAMP.sub(r"\1 \2 UTC", text)
+
+
+def grouped(text: str) -> str:
+    """A text in which amounts of money have their thousands apart, `32 000 EUR`."""
+    return _MONEY.sub(lambda found: f"{int(found[0]):,}".replace(",", "\N{NO-BREAK SPACE}"), text)
 
 
 def spreadsheet_safe(text: object) -> str:

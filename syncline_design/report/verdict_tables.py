@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.text import grouped
 from syncline_design.report.verdict_words import (
     kind_text,
     larger,
@@ -251,7 +252,9 @@ def assumptions(verdict: Verdict) -> Table | None:
     """Figures without a public source that this verdict rests on, a row per catalog entry."""
     figures: dict[tuple[str, str], list[str]] = {}
     for entry in verdict.assumptions or ():
-        figures.setdefault((entry.entry, entry.note), []).append(f"{entry.figure} {entry.value}")
+        figures.setdefault((entry.entry, entry.note), []).append(
+            f"{entry.figure} {grouped(entry.value)}"
+        )
     rows = [
         (Cell(name, code=True), "; ".join(values), note) for (name, note), values in figures.items()
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -19,19 +19,27 @@ SIMULATED: Final = "simulated"
 SEED: Final = 0  # which of many are drawn tells nothing, so that it need not follow the user's
 
 
-def cloud(problem: Problem, front: Sequence[FrontDesign] = ()) -> tuple[CloudDesign, ...]:
+def cloud(
+    problem: Problem,
+    front: Sequence[FrontDesign] = (),
+    names: Sequence[Mapping[str, str]] | None = None,
+) -> tuple[CloudDesign, ...]:
     """Designs with a price, by rising price, whether they keep the requirements or not.
 
-    front: of cost; where figures are simulated, a design that it leaves out though no other is as
-    good breaks one of them: nothing else could have kept it out.
+    names: of each role's sensors by their ids, as the front tells its own.  front: of cost; where
+    figures are simulated, a design that it leaves out though no other is as good breaks one of
+    them: nothing else could have kept it out.
     """
-    found = []
+    found, named = [], names or [{} for _ in problem.roles]
     for design in _designs(problem):
         in_force().check()
         sums = evaluate(problem, design)
         if sums.cost is not None:
             options = chosen_options(problem, design)
-            payload = ", ".join(f"{one.sensor} ({one.method})" for one in options)
+            payload = ", ".join(
+                f"{called.get(one.sensor, one.sensor)} ({one.method})"
+                for called, one in zip(named, options, strict=True)
+            )
             breaks = broken(problem, sums, accuracy=False)
             one = CloudDesign(float(sums.cost), float(sums.total_m), payload, breaks)
             if not breaks and problem.judge is not None and front and not _beaten(one, front):

@@ -64,6 +64,22 @@ def named_design(case: Case, problem: Problem, design: Design, figures: Budget) 
     )
 
 
+def sensor_names(case: Case, problem: Problem) -> list[dict[str, str]]:
+    """The names of each role's sensors by their ids; what has none is called by its id."""
+    found = []
+    for table in problem.roles:
+        role = case.stages[table.stage].role(table.role)
+        assert role is not None
+        ids = dict.fromkeys(option.sensor for option in table.options)
+        found.append({one: _called(role, one) for one in ids})
+    return found
+
+
+def _called(role: RoleCase, sensor: str) -> str:
+    entry = role.sensor(sensor)
+    return (entry.name if entry is not None else "") or sensor
+
+
 def _roles(
     stage: StageCase,
     problem: Problem,
@@ -77,10 +93,10 @@ def _roles(
 
 
 def _role(role: RoleCase, option: Option, row: SensorRow) -> NamedRole:
-    sensor, method = role.sensor(option.sensor), role.method(option.method)
+    method = role.method(option.method)
     return NamedRole(
         sensor=option.sensor,
-        name=(sensor.name if sensor is not None else "") or option.sensor,
+        name=_called(role, option.sensor),
         primitive=option.primitive,
         timestamping=option.method,
         timestamping_name="given in the spec" if method is None else method.name or option.method,

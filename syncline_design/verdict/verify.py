@@ -19,6 +19,7 @@ from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.cautions import unproven
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
 from syncline_design.verdict.cloud import cloud
+from syncline_design.verdict.design_data import sensor_names
 from syncline_design.verdict.no_design import infeasible_verdict, unfinished_verdict
 from syncline_design.verdict.one_design import verdict_on, verify
 from syncline_design.verdict.open_choice import Picked, chosen_of, pick
@@ -114,9 +115,9 @@ def open_verdict(
         pictured=settings.cloud, others=settings.others, brief=settings.brief,
     )  # fmt: skip
     if settings.cloud:
-        choice = replace(
-            choice, cloud=tuple(pieces.listed("cloud", lambda: cloud(problem, choice.front or ())))
-        )
+        names = sensor_names(case, problem)
+        around = pieces.listed("cloud", lambda: cloud(problem, choice.front or (), names))
+        choice = replace(choice, cloud=tuple(around))
     found = verdict_on(case, problem, picked.verified, settings, choice)
     missing = choice.front_left_out
     warnings = (
