@@ -315,3 +315,17 @@ def test_columns_that_the_spec_names_are_listed(tmp_path: Path) -> None:
     assert (stream["messages"], stream["first_ns"], stream["last_ns"]) == (40, 0, 3_900_000_000)
     assert stream["quantity"] == ["position", "attitude", "reference"]
     assert found["proposal"]["kind"] == "position"
+
+
+def test_a_stream_that_began_before_the_others_is_not_off(tmp_path: Path) -> None:
+    """One stream has times 100 s before three others have; a fifth stands 20 years before."""
+    lines = []
+    for k in range(110):
+        clock = f"05-04T10:{k // 60:02d}:{k % 60:02d}Z"
+        kinds = ("SKY", "TPV", "ATT", "GST") if k >= 100 else ("SKY",)
+        lines += [f'{{"class":"{kind}","time":"2026-{clock}"}}' for kind in kinds]
+        lines.append(f'{{"class":"IMU","time":"2006-{clock}"}}')
+    path = tmp_path / "run.json"
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    off = {s.name for s in inspect_logs([path]).streams if "off those of" in " ".join(s.notes)}
+    assert off == {"IMU"}

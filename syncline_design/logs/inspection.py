@@ -228,7 +228,7 @@ def rate_hz(stamps: Nanoseconds) -> float | None:
 
 def _outside(found: Sequence[Stream]) -> dict[str, tuple[str, ...]]:
     """What to say of streams whose stamps are unset or lie far from all others of the file."""
-    middles, ends = {}, []
+    most, ends = {}, []
     notes: dict[str, tuple[str, ...]] = {}
     for one in found:
         if one.stamps is None:
@@ -239,14 +239,16 @@ def _outside(found: Sequence[Stream]) -> dict[str, tuple[str, ...]]:
             notes[one.name] = (f"{zeros} of {one.messages} stamps are 0 or not set",)
         known = stamps[(stamps != UNSET) & (stamps != 0)]
         if known.shape[0]:
-            middles[one.name] = int(np.median(known))
+            first, last = np.quantile(known, (0.05, 0.95), method="nearest").tolist()
+            most[one.name] = (first, int(np.median(known)), last)
             ends.append((int(known.min()), int(known.max()), one.timeline))
     if len(ends) < 3:
         return notes
     low, high = int(np.median([e[0] for e in ends])), int(np.median([e[1] for e in ends]))
     far = 2 * max(high - low, 1_000_000_000)
-    for name, middle in middles.items():
-        if not low - far <= middle <= high + far:
+    # one that began long before the others were set lies about them and is not off
+    for name, (first, middle, last) in most.items():
+        if last < low - far or first > high + far:
             apart = (middle - high if middle > high else middle - low) / NANO
             words = (
                 f"its stamps lie {to_places(apart, 3, sign=True)} s off those of the "
