@@ -18,7 +18,8 @@ import numpy as np
 import pytest
 
 from syncline_design.campaign.kept import Run, statistics_of
-from syncline_design.campaign.store import add_run, read_store
+from syncline_design.campaign.looks import KeptLook
+from syncline_design.campaign.store import add_looks, add_run, read_store
 from syncline_design.diagnosis.sufficient import Less, Sufficient
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.records import read_as
@@ -69,6 +70,11 @@ def begun(sample: Path, store: Path, name: str) -> subprocess.Popen[str]:
                             text=True)  # fmt: skip
 
 
+def another(run: Run, name: str) -> Run:
+    """A run of its own, that tells of another parameter."""
+    return replace(run, sha256=name.rjust(64, "0"), parameters=(f"latency/position/0/x{name}_s",))
+
+
 def bodies(store: Path) -> list[dict]:
     """All lines of a store, each hash worked out anew."""
     last, found = "0" * 64, []
@@ -114,6 +120,79 @@ def test_runs_that_were_acknowledged_outlive_their_writers(sample: Path, tmp_pat
     last = found.entries[-1].run
     with pytest.raises(BadInput, match="in the store already"):
         add_run(store, "car", pinned_system(case), last)
+
+
+def test_a_writer_that_stops_at_any_byte_of_its_lines_loses_no_other(
+    sample: Path, tmp_path: Path
+) -> None:
+    """Every byte of the last two lines, a run and its look: all runs acknowledged before are there,
+    what is left of the line is said by its length, and the next writer begins in its place."""
+    store, case = tmp_path / "store.jsonl", load(sample / "spec.yaml")
+    run = read_as(Run, (sample / "run.json").read_bytes())
+    system = pinned_system(case)
+    for k in range(3):
+        add_run(store, "car", system, another(run, str(k)))
+    before = read_store(store)
+    assert before is not None
+    add_looks(before, [KeptLook("a" * 64, 0.5, (1.0,), (1.0,))])
+    whole = store.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    assert [body["kind"] for body in bodies(store)] == ["store", "run", "run", "run", "looks"]
+    cut, ends = tmp_path / "cut.jsonl", np.cumsum([len(line) for line in lines])
+    for at in range(int(ends[-3]), len(whole) + 1):
+        cut.write_bytes(whole[:at])
+        found, kept = read_store(cut), int(np.sum(ends <= at))
+        assert found is not None
+        assert [e.run.sha256 for e in found.entries] == [
+            f"{k:064d}" for k in range(min(kept - 1, 3))
+        ]
+        assert found.torn == at - ends[kept - 1]
+        assert len(found.looks) == (kept == len(lines))
+    for at in (ends[-3] + 1, ends[-2] - 1, ends[-2], ends[-1] - 1):
+        cut.write_bytes(whole[: int(at)])
+        add_run(
+            cut,
+            "car",
+            system,
+            replace(run, sha256="9" * 64, parameters=("latency/position/0/y_s",)),
+        )
+        kinds = [body["kind"] for body in bodies(cut)]
+        assert kinds == ["store", *["run"] * (2 + int(at >= ends[-2])), "run"]
+
+
+def test_lines_that_were_moved_copied_or_joined_are_refused(sample: Path, tmp_path: Path) -> None:
+    """Whole lines of true stores, in an order in which they were not written; a store that ends
+    earlier is believed, as docs/joint.md says."""
+    case = load(sample / "spec.yaml")
+    run = read_as(Run, (sample / "run.json").read_bytes())
+    texts = []
+    for name in "ab":
+        store = tmp_path / f"{name}.jsonl"
+        for k in range(3):
+            own = replace(
+                run, sha256=f"{name}{k:063d}", parameters=(f"latency/position/0/{name}{k}_s",)
+            )
+            add_run(store, "car", pinned_system(case), own)
+        texts.append(store.read_bytes().splitlines(keepends=True))
+    (head, *runs), (_, *others) = texts
+    odd = tmp_path / "odd.jsonl"
+    for lines in (
+        [head, runs[1], runs[0], runs[2]],
+        [head, runs[0], runs[2]],
+        [head, *runs, runs[2]],
+        [head, *runs, runs[0]],
+        [head, *runs, head, *runs],
+        [head, *runs, *others],
+        [head, runs[0], others[1], runs[2]],
+        runs,
+    ):
+        odd.write_bytes(b"".join(lines))
+        with pytest.raises(BadInput, match="damaged"):
+            read_store(odd)
+    odd.write_bytes(b"".join([head, *runs[:2]]))
+    found = read_store(odd)
+    assert found is not None
+    assert (len(found.entries), found.torn) == (2, 0)
 
 
 def test_every_cut_of_a_store_is_whole_lines_or_refused(sample: Path, tmp_path: Path) -> None:
