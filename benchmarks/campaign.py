@@ -3,7 +3,7 @@
     python -m benchmarks.campaign logs [--count N] [--foreign] [--kind position]
     python -m benchmarks.campaign power [--sets N] [--foreign]
     python -m benchmarks.campaign series [--series N] [--looks N] [--scatter S] [--drift D]
-        [--constants N] [--days FOLDER] [--store FILE]
+        [--constants N] [--off S] [--days FOLDER] [--store FILE]
     python -m benchmarks.campaign delays [--series N] [--scatter S] [--days FOLDER] [--store FILE]
     python -m benchmarks.campaign quiet [--foreign]
     python -m benchmarks.campaign cover [--sets N] [--foreign]
@@ -14,7 +14,9 @@ drawn) and asks what is named.  The effect is added to the statistics, along the
 with such an effect are in tests/test_joint.py.  `series` draws statistics of runs like these from
 the normal law and watches them, with one effect drawn from the dictionary that differs from run to
 run by S bounds of a run, or that drifts by D bounds over all runs, and N effects of 20 bounds in
-all runs; every series is of one vehicle, as a store is.  `delays` moves one effect with the 11th
+all runs; with --off every parameter of every effect is a constant, normal about 0 with so many
+bounds of a run, and the runs last between half and twice as long; every series is of one vehicle,
+as a store is.  `delays` moves one effect with the 11th
 run.  FOLDER: stores that `benchmarks.days --keep` left, of which the first six days are clean; else
 the logs are those that were kept.  FILE keeps a row a series; what it has is not run again.
 `quiet` watches the clean logs themselves, platform by platform.
@@ -151,11 +153,14 @@ def _values(pool: Pool, term: Term, rng: np.random.Generator) -> np.ndarray:
     return BOUNDS * spread * np.array(signs)
 
 
-def drawn(one: Sufficient, rng: np.random.Generator, values: np.ndarray) -> Sufficient:
-    """Statistics of a run driven like this one, drawn from the normal law, part by part."""
+def drawn(
+    one: Sufficient, rng: np.random.Generator, values: np.ndarray, lasts: float = 1.0
+) -> Sufficient:
+    """Statistics of a run driven like this one, so many times as long, drawn from the normal law,
+    part by part."""
     (less, *_) = one.less
     parts, scores = [], []
-    for part in one.normal - less.normal:
+    for part in lasts * (one.normal - less.normal):
         size, turned = np.linalg.eigh(part)
         size = np.maximum(size, 0.0)
         whole = (turned * size) @ turned.T
@@ -181,6 +186,7 @@ def series(vehicles: Sequence[Sequence[Sufficient]], asked: argparse.Namespace) 
     """False alarms over all looks."""
     rows = _rows(asked.store)
     name = f"scatter {asked.scatter:g} drift {asked.drift:g} of {asked.constants} {asked.looks}"
+    name += f" off {asked.off:g}" if asked.off else ""
     known = {row["series"]: row["rung"] for row in rows if row["what"] == name}
     for k in range(asked.series):
         if k not in known:
@@ -189,7 +195,8 @@ def series(vehicles: Sequence[Sequence[Sufficient]], asked: argparse.Namespace) 
             picks = [group[i] for i in rng.integers(len(group), size=asked.looks + 1)]
             values = _unrest(picks, rng, asked.scatter, asked.drift)
             values += _constants(picks, rng, asked.constants)
-            runs = [drawn(s, rng, own) for s, own in zip(picks, values, strict=True)]
+            values, lasts = values + _off(picks, rng, asked.off), _lasting(rng, len(picks), asked)
+            runs = [drawn(s, rng, *own) for s, *own in zip(picks, values, lasts, strict=True)]
             changes = Changes(pool_of(runs, range(len(runs))))
             known[k] = _first_ring(changes, range(2, len(runs) + 1))
             _keep(asked.store, {"what": name, "series": k, "rung": known[k]})
@@ -204,13 +211,14 @@ def delays(vehicles: Sequence[Sequence[Sufficient]], asked: argparse.Namespace) 
     rows = _rows(asked.store)
     for bounds in DELAYED:
         name = f"delay {bounds:g} scatter {asked.scatter:g}"
+        name += f" off {asked.off:g}" if asked.off else ""
         known = {row["series"]: row["delay"] for row in rows if row["what"] == name}
         for k in range(asked.series):
             if k not in known:
                 rng = np.random.default_rng([13, k])
                 group = vehicles[k % len(vehicles)]
                 picks = [group[i] for i in rng.integers(len(group), size=31)]
-                known[k] = _delay(picks, rng, bounds, asked.scatter)
+                known[k] = _delay(picks, rng, bounds, asked)
                 _keep(asked.store, {"what": name, "series": k, "delay": known[k]})
         heard = np.array(list(known.values()))
         middle, late = np.quantile(heard, [0.5, 0.9])
@@ -240,6 +248,19 @@ def _constants(picks: Sequence[Sufficient], rng: np.random.Generator, count: int
     return found[[pool.labels.index(label) for label in picks[0].labels]]
 
 
+def _off(picks: Sequence[Sufficient], rng: np.random.Generator, bounds: float) -> np.ndarray:
+    """Values of all parameters that every run has, (P,): each normal with so many bounds."""
+    if not bounds:
+        return np.zeros(len(picks[0].labels))
+    told = np.mean([np.diag(one.normal) for one in picks], axis=0)
+    spread = np.where(told > 0.0, told, np.inf) ** -0.5
+    return np.asarray(bounds * spread * rng.standard_normal(len(spread)))
+
+
+def _lasting(rng: np.random.Generator, runs: int, asked: argparse.Namespace) -> np.ndarray:
+    return rng.uniform(0.5, 2.0, runs) if asked.off else np.ones(runs)
+
+
 def _unrest(
     picks: Sequence[Sufficient], rng: np.random.Generator, scatter: float, drift: float
 ) -> np.ndarray:
@@ -260,7 +281,10 @@ def _unrest(
 
 
 def _delay(
-    picks: Sequence[Sufficient], rng: np.random.Generator, bounds: float, scatter: float
+    picks: Sequence[Sufficient],
+    rng: np.random.Generator,
+    bounds: float,
+    asked: argparse.Namespace,
 ) -> float:
     """Runs with the change until the alarm, the first counted; 21 where it never came."""
     quiet = pool_of(picks, range(len(picks)))
@@ -269,8 +293,9 @@ def _delay(
     values[term.index] = bounds / BOUNDS * _values(quiet, term, rng)
     place = [quiet.labels.index(label) for label in picks[0].labels]
     moved = np.array([(values if k >= 10 else 0.0 * values)[place] for k in range(len(picks))])
-    moved += _unrest(picks, rng, scatter, 0.0)
-    runs = [drawn(s, rng, own) for s, own in zip(picks, moved, strict=True)]
+    moved += _unrest(picks, rng, asked.scatter, 0.0) + _off(picks, rng, asked.off)
+    lasts = _lasting(rng, len(picks), asked)
+    runs = [drawn(s, rng, *own) for s, *own in zip(picks, moved, lasts, strict=True)]
     changes = Changes(pool_of(runs, range(len(runs))))
     ring = _first_ring(changes, range(11, len(runs) + 1))
     return 21.0 if ring is None else ring - 10.0
@@ -328,6 +353,7 @@ def main() -> None:
     parser.add_argument("--scatter", type=float, default=0.0)
     parser.add_argument("--drift", type=float, default=0.0)
     parser.add_argument("--constants", type=int, default=0)
+    parser.add_argument("--off", type=float, default=0.0)
     parser.add_argument("--days", type=Path)
     parser.add_argument("--store", type=Path)
     parser.add_argument("--kind", default="georeference", choices=["georeference", "position"])

@@ -67,11 +67,8 @@ def shortest(setup: Setup, search: LegSearch, most_s: float) -> Shortest:
 def _passed_by(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTold]:
     """The shortest drive that is enough, of this one and of those that the search has looked at,
     as many as may be judged; what falls short by its legs alone the least is judged first."""
-    by_id = {id(told): told for told in search.legs}
-    off = {key: float(np.max(one.every, initial=0.0)) for key, one in search.known.items() if key}
-    likely = sorted((key for key, size in off.items() if size <= PASSED_BY), key=off.__getitem__)
     left = MOST_PASSED_BY
-    for legs in ([by_id[k] for k in key] for key in likely):
+    for legs in search.looked_at(lambda one: float(np.max(one.every, initial=0.0)), PASSED_BY):
         if not left or search.deadline.is_over:
             break
         if lasting_s(legs) < lasting_s(enough) - 1e-6 and search.fits(legs):

@@ -94,6 +94,7 @@ class Flown(Record):
     """A log held against what was asked: its duration, and what it tells.
 
     cautions: where it contradicts itself or what the platform can do, as another vehicle's does.
+    confused: effects any of which, left free, would widen what was asked too far.
     """
 
     files: tuple[str, ...]
@@ -103,6 +104,7 @@ class Flown(Record):
     correlation: float | None
     reached: bool
     cautions: tuple[str, ...] | None = optional()
+    confused: tuple[str, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,15 +121,16 @@ class PlanProvenance(Record):
 class Plan(Record):
     """A drive and what it tells.
 
-    reached: within the minutes.  least_minutes: the least that reaches all that is asked, null
-    where no drive does.  tolerance: what is asked, SI.  inseparable: pairs that no drive of this
-    platform tells apart.  confused: effects any of which, left free, would widen what is asked too
-    far, though another drive tells them apart.  unseen: what the drive says next to nothing of.
-    priors: standard deviations before the drive, SI.  assumed: figures of the platform that the
-    spec does not state.  surveyed: whether the targets were there already, and the drive is laid
-    beside them.  sized: whether pairs are judged at a size that is known, beyond first order.
-    cautions: where what the plan was given may not be of this system.  alike: of the inseparable
-    ones those that make the same error on every leg that this platform can drive.
+    reached: within the minutes, and told from every other effect that some drive tells it from.
+    least_minutes: the least that does so, null where no drive does.  tolerance: what is asked, SI.
+    inseparable: pairs that no drive of this platform tells apart.  confused: effects any of which,
+    left free, would widen what is asked too far, though another drive tells them apart; none where
+    it is reached.  unseen: what the drive says next to nothing of.  priors: standard deviations
+    before the drive, SI.  assumed: figures of the platform that the spec does not state.
+    surveyed: whether the targets were there already, and the drive is laid beside them.  sized:
+    whether pairs are judged at a size that is known, beyond first order.  cautions: where what the
+    plan was given may not be of this system.  alike: of the inseparable ones those that make the
+    same error on every leg that this platform can drive.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA

@@ -9,7 +9,7 @@ Source: Fedorov, Theory of Optimal Experiments (1972), for exchange.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, replace
 from functools import cached_property, partial
 from typing import Final
@@ -129,6 +129,12 @@ class PlanJudge:
         within = np.where(np.isinf(self.others.limit), 0.0, widened)
         held = within / np.where(asked, 2.0 * self.goal.tolerance, 1.0)
         return np.asarray(np.where(asked, np.minimum(share, held), share))
+
+    def enough(self, information: Array) -> bool:
+        """Whether all that is asked is reached, and told from every other effect: the one rule for
+        whole drives, line plans and logs, however long they may last."""
+        worst = [*self.ratios(information, exact=True), *self.confusions(information)]
+        return bool(max(worst, default=0.0) <= 1.0)
 
     def confusions(self, information: Array) -> Array:
         """The largest share of any one other effect, by what is wanted."""
@@ -254,6 +260,15 @@ class LegSearch:
         found = self.standing(self.key(sequence), lambda: together(sequence))
         return found.value(self.margin)
 
+    def looked_at(
+        self, worth: Callable[[Standing], float], most: float = math.inf
+    ) -> Iterator[list[LegTold]]:
+        """What the search has looked at so far and is worth at most so much, the least first."""
+        by_id = {id(told): told for told in self.legs}
+        sized = ((worth(one), key) for key, one in self.known.items() if key)
+        for _, key in sorted((one for one in sized if one[0] <= most), key=lambda one: one[0]):
+            yield [by_id[k] for k in key]
+
     def reaches(self, sequence: Sequence[LegTold]) -> bool:
         return bool(sequence) and self.value(sequence)[0] <= 0.0
 
@@ -340,12 +355,19 @@ class _Once:
 
 
 def best_within(search: LegSearch, most_s: float) -> list[LegTold]:
-    """The plan for at most so much time."""
+    """The plan for at most so much time: what is best for its time leg by leg, bettered, or what
+    the search for longer drives met in passing, where that is nearer to what is asked."""
     plan = search.grown([], most_s)
     if not plan:  # not one leg fits: the shortest shows what it would take
         fitting = [told for told in search.legs if search.fits([told])] or search.legs
         return [min(fitting, key=lambda told: lasting_s([told]))]
-    return plan if search.reaches(plan) else search.bettered(plan, most_s)
+    if search.reaches(plan):
+        return plan
+    plan = search.bettered(plan, most_s)
+    worth = search.value(plan)[1]
+    seen = search.looked_at(lambda one: one.value(search.margin)[1], worth)
+    within = (legs for legs in seen if lasting_s(legs) <= most_s and search.fits(legs))
+    return next(within, plan)
 
 
 def reaching(search: LegSearch, most_s: float) -> list[list[LegTold]]:

@@ -122,8 +122,7 @@ class Setup:
 
     def reached(self, found: WholeDrive) -> bool:
         """Whether a drive tells all that is asked, whatever it takes."""
-        ratios = self.judge.ratios(found.after[-1], exact=True)
-        return bool(np.all(ratios <= 1.0))
+        return self.judge.enough(found.after[-1])
 
 
 def _world(case: Case, system: System, request: PlanRequest) -> World:

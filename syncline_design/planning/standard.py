@@ -9,7 +9,7 @@ What is logged are the lines; the turns between them count as time alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -137,23 +137,10 @@ def _turns_s(own: Sequence[tuple[LegTold, int]], rate_radps: float) -> Array:
     return np.array([angle / rate_radps if angle > LEAST_TURN_RAD else 0.0 for angle in angles])
 
 
-def legs_needed(judge: PlanJudge, lines: Lines, taken: Collection[int]) -> int | None:
-    """The fewest legs of a line plan, in its order, that reach what is asked; None: none do.
-
-    taken: places of the effects that may take it all the same, as in the drive beside it.
-    """
-
-    def enough(count: int) -> bool:
-        information = lines.told(count)
-        return reached(judge, information) and set(judge.confusing(information)) <= set(taken)
-
-    before = most_within(lambda count: not enough(count))
+def legs_needed(judge: PlanJudge, lines: Lines) -> int | None:
+    """The fewest legs of a line plan, in its order, that are enough; None: none are."""
+    before = most_within(lambda count: not judge.enough(lines.told(count)))
     return None if before >= MOST_LEGS else before + 1
-
-
-def reached(judge: PlanJudge, information: Array) -> bool:
-    """Whether all that is asked is."""
-    return bool(np.all(judge.ratios(information, exact=True) <= 1.0))
 
 
 def most_within(holds: Callable[[int], bool]) -> int:
@@ -170,13 +157,13 @@ def most_within(holds: Callable[[int], bool]) -> int:
 
 
 def times_needed(judge: PlanJudge, information: Array) -> float | None:
-    """How many times a drive has to be driven until all is reached, the last one in part; None:
-    however often."""
-    before = most_within(lambda count: not reached(judge, count * information))
+    """How many times a drive has to be driven until it is enough, the last one in part; None:
+    however often it never is."""
+    before = most_within(lambda count: not judge.enough(count * information))
     if before >= MOST_LEGS:
         return None
     low, high = float(before), float(before + 1)
     while high - low > PART * high:
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if reached(judge, middle * information) else (middle, high)
+        low, high = (low, middle) if judge.enough(middle * information) else (middle, high)
     return high

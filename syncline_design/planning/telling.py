@@ -253,10 +253,9 @@ class Telling:
         stage = world.every[wanted[0]].candidate.stage if wanted else 0
         found = []
         vehicle = world.vehicles[stage]
-        taken = self.setup.judge.confusing(drive.after[-1])
         for one in line_plans(vehicle, world.looked_at(standard_legs(vehicle, stage))):
             in_force().check()
-            legs = legs_needed(self.setup.judge, one, taken)
+            legs = legs_needed(self.setup.judge, one)
             information = one.told_in(duration_s(drive))
             found.append(
                 StandardPlan(
@@ -298,15 +297,15 @@ class Telling:
         own = replace(self.setup.world, rate_hz=self.setup.world.computed_hz)
         structure, level = own.noise(view)
         information = fisher(structure, level, self.setup.world.columns(view))
-        ratios = self.setup.judge.ratios(information, exact=True)
         return Flown(
             tuple(path.name for path in self.setup.request.flown),
             inputs.log.duration_s,
             len(inputs.log),
             self._sigma(information),
             self._correlation(information),
-            bool(np.all(ratios <= 1.0)),
+            self.setup.judge.enough(information),
             tuple(one.message for one in log_checks(view)) or None,
+            self._confused(information) or None,
         )
 
 

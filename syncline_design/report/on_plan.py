@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Final
 
@@ -109,16 +109,20 @@ def _sentences(found: Plan) -> Iterator[Inline]:
             yield f"No drive of this platform can tell {words} apart: {ONE}."
         else:
             yield f"No drive of this platform tells {words} apart, {_how_far(found)}."
-    if found.reached and not found.confused:
+    if found.reached:
         asked = "else that" if found.inseparable else "that"
         yield (
             f"All {asked} is asked is reached, and none of the other effects that a drive can tell "
             "apart would take it, left free one at a time."
         )
     if found.confused:
-        names = ", ".join(map(effect_words, found.confused))
-        yield f"Left free one at a time, these would take it: {names}."
+        yield _would_take(found.confused)
     yield from found.cautions or ()
+
+
+def _would_take(confused: Sequence[str]) -> str:
+    names = ", ".join(map(effect_words, confused))
+    return f"Left free one at a time, these would take what is asked: {names}."
 
 
 def _larger(found: Plan) -> Separated | None:
@@ -287,9 +291,9 @@ def _standard(found: Plan) -> list[Node]:
     ]
     heads = ("Plan", "Until reached #", *(f"{parameter(k)} #" for k in keys), "Correlation #")
     note = (
-        "Until what is asked is reached, and told from every effect that this drive tells it from. "
-        "Line plans are taken line by line in their order; the turns between lines count as time, "
-        "and are not logged. Standard uncertainties in the time of this drive."
+        "Until what is asked is reached, and told from every other effect that some drive tells "
+        "it from. Line plans are taken line by line in their order; the turns between lines count "
+        "as time, and are not logged. Standard uncertainties in the time of this drive."
     )
     return show(table("Beside the standard line plans", heads, rows, note), silent=True)
 
@@ -318,6 +322,8 @@ def _flown(flown: Flown | None) -> list[Node]:
     said = "reaches what is asked" if flown.reached else "does not reach what is asked"
     files = ", ".join(flown.files)
     words = f"{files}: {numbers.count(flown.rows)} rows, {numbers.time(flown.duration_s)}; {said}."
+    if flown.confused:
+        words = f"{words} {_would_take(flown.confused)}"
     odd = [Items(flown.cautions, "!", "warn")] if flown.cautions else []
     return [Text(words), *odd, Items(tuple(lines))]
 
