@@ -18,9 +18,20 @@ from syncline_design.report import numbers
 from syncline_design.report.charts_front import FrontMark, pareto_front
 from syncline_design.report.charts_study import ACROSS, cost_map
 from syncline_design.report.choice_tables import sensors
-from syncline_design.report.document import Chart, Document, Facts, Outcome, Text, section
+from syncline_design.report.document import (
+    Chart,
+    Document,
+    Facts,
+    Group,
+    Outcome,
+    Text,
+    section,
+    show,
+)
+from syncline_design.report.layout import laid_out
 from syncline_design.report.render_html import MOST_VALUES, html
 from syncline_design.report.simulated import quantiles
+from syncline_design.report.table import table
 from syncline_design.report.text import dated, grouped
 from syncline_design.report.verdict_tables import assumptions
 from syncline_design.spec.load import load_text
@@ -170,3 +181,52 @@ def test_both_ends_of_every_interval_of_a_quantile_have_the_same_digits() -> Non
     digits = {len(re.sub(r"[^0-9]|^0+\.?0*", "", end.partition("\u00a0")[0])) for end in ends}
     assert any(end.partition("\u00a0")[0].endswith("0") for end in ends)
     assert digits == {4}
+
+
+def rows_of(count: int, words: str = "x", heads: int = 3) -> Any:
+    (node,) = show(table("T", ("A", "B", "C", "D", "E")[:heads], [[words] * heads] * count))
+    return node
+
+
+FIGURE = Chart("front", lambda: pareto_front([FrontMark(1.0, 1.0, True)], "EUR", None, None), "x")
+
+
+@pytest.mark.parametrize(
+    ("after", "beside"),
+    [
+        ([rows_of(2), rows_of(2), rows_of(3, heads=5)], 2),  # the last is too wide
+        ([rows_of(2), rows_of(2), rows_of(2)], 3),
+        ([rows_of(12), rows_of(2)], 1),  # as long as the figure is high already
+        ([rows_of(4, "word " * 24), rows_of(2)], 1),  # three lines each
+        ([rows_of(2), Text("x"), rows_of(2)], 1),
+    ],
+)
+def test_small_tables_fill_what_is_blank_beside_a_figure(after: list[Any], beside: int) -> None:
+    """A front of two designs left half a row blank above the table of its price steps."""
+    pair, *rest = laid_out([FIGURE, *after])
+    assert isinstance(pair, Group)
+    assert pair.form == "pair"
+    right = pair.nodes[1]
+    found = list(right.nodes) if isinstance(right, Group) else [right]
+    assert [*found, *rest] == after
+    assert len(found) == beside
+
+
+@pytest.mark.browser
+def test_heads_of_a_maps_values_take_two_lines_at_most(browser: Any, tmp_path: Path) -> None:
+    """Beside the map, where half of the card is theirs: `requirements[ACC-1]`, then `.limit`."""
+    names = ("30 m", "140 m"), ("0.05 m", "0.5 m")
+    costs, payload = ((1e4, 2e4), (3e4, None)), (("a long payload " * 4,) * 2,) * 2
+    keys = "stages[uav].distance", "requirements[ACC-1].limit"
+    heat = HeatMap(*keys, "EUR", *names, costs, payload)
+    path = tmp_path / "page.html"
+    path.write_text(page(Chart("heat", lambda: cost_map(heat), "x")), "utf-8")
+    lines = """() => [...document.querySelectorAll('.values th[scope=col]')].map(head => {
+      const range = document.createRange(); range.selectNodeContents(head);
+      return new Set([...range.getClientRects()].map(box => Math.round(box.top / 8))).size; })"""
+    with Opened(browser, path, viewport={"width": 1300, "height": 900}) as opened:
+        found = opened.page.evaluate(lines)
+        wide = opened.page.eval_on_selector(".values .inner", "e => e.scrollWidth - e.clientWidth")
+    assert len(found) == 4
+    assert max(found) <= 2
+    assert wide <= 0

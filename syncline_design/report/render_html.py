@@ -31,6 +31,7 @@ _PHONE: Final = 48
 _NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
 _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
+_DOT: Final = re.compile(r"(?<=[\w\]])(?=\.)")
 
 
 def html(document: Document) -> str:
@@ -183,7 +184,7 @@ def _soft(text: str) -> str:
 
 
 def _breakable(text: str) -> Any:
-    """A key path that may go on in the next line before each of its dots and brackets."""
+    """A key path that may go on in the next line before each of its dots."""
     from markupsafe import Markup
 
-    return Markup("<wbr>").join(_whole(part) for part in _STEP.split(visible(text)))
+    return Markup("<wbr>").join(_whole(part) for part in _DOT.split(visible(text)))
