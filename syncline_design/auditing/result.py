@@ -33,6 +33,7 @@ FaultName = Literal[
     "ahead_of_receipt",
     "batched_by_recorder",
     "recorder_clock",
+    "wrong_receipts",
 ]
 Soundness = Literal["sound", "faults"]
 

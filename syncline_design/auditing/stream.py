@@ -44,6 +44,7 @@ from syncline_design.auditing.stream_epochs import (
     known_offset,
     with_epoch,
 )
+from syncline_design.auditing.wrong_receipts import without_wrong_receipts
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -94,8 +95,9 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     in_force().check()
     stamps = stream.stamps
     assert stamps is not None
-    raw = in_order_of_receipt(series_of(stamps.primary_ns, _receipts(stamps), start))
     found: list[StampFault] = []
+    recorded = series_of(stamps.primary_ns, _receipts(stamps), start)
+    raw = in_order_of_receipt(_take(without_wrong_receipts(recorded), found))
     series, unit, step_ns = _in_one_unit(raw, found, stamps.primary_factor)
     series = _take(without_lone_slips(series), found)
     disorder = disorder_of(series)

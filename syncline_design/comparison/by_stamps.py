@@ -13,7 +13,9 @@ from syncline_design.comparison.judgement import Judgement
 from syncline_design.model.figure_text import format_duration
 
 # faults of the recorder and of the way to it, not of the stamps
-_ON_THE_WAY: Final = ("recorder_clock", "batched_by_recorder", "lost_messages", "gap", "duplicates")
+_ON_THE_WAY: Final = (
+    "recorder_clock", "wrong_receipts", "batched_by_recorder", "lost_messages", "gap", "duplicates",
+)  # fmt: skip
 _LATE: Final = "stamped_on_arrival"  # as a design may mean it
 # Messages of which the worst one is, with 95 % confidence, beyond 95 % of all: 0.95^59 < 0.05
 # (Wilks, Ann. Math. Stat. 12, 1941); fewer bear no bound out.

@@ -52,6 +52,7 @@ WORDS: Final[Mapping[str, str]] = {
     "ahead_of_receipt": "stamps after their receipt",
     "batched_by_recorder": "written in batches",
     "recorder_clock": "the recorder's clock was set",
+    "wrong_receipts": "receipts of single messages wrong",
 }
 MEND: Final[Mapping[str, str]] = {
     "epoch_offset": "subtract the constant, or give the driver the right scale or unit",
@@ -72,6 +73,7 @@ MEND: Final[Mapping[str, str]] = {
     "unset_stamps": "drop these messages; wait for the first fix before recording",
     "ahead_of_receipt": "bring both clocks to one reference (PTP, NTP)",
     "recorder_clock": "do not let the recording host's clock be set during a run",
+    "wrong_receipts": "leave these messages out; look at the recorder and at the file's medium",
 }
 
 
