@@ -19,7 +19,7 @@ from syncline_design.diagnosis.episodes import (
     _shares,
     _stands_out,
 )
-from syncline_design.diagnosis.search import DiagnosisSettings
+from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.effects import registry
 from syncline_design.report.on_findings import noise_lines
 from syncline_design.spec.edit import with_effects

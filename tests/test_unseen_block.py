@@ -81,7 +81,7 @@ def test_where_nothing_moves_the_mean_no_block_is_kept_back(tmp_path: Path) -> N
 def test_what_the_rest_does_not_bear_out_goes(tmp_path: Path) -> None:
     inputs = inputs_of(world(), tmp_path)
     search = _started(inputs, inputs.log, DiagnosisSettings())
-    bias = next(c for c in search.candidates if c.label[:2] == ("range_bias", "ranging"))
+    bias = next(c for c in search.proposals.candidates if c.label[:2] == ("range_bias", "ranging"))
     claimed = fit(search.data, [bias.acting({"bias_m": 0.02})])
     assert claimed.labels == (bias.label,)
     assert search.confirmed(claimed).labels == ()
@@ -91,7 +91,7 @@ def left_in(log: WorldLog, folder: Path) -> Remainder:
     inputs = inputs_of(log, folder)
     search = _started(inputs, inputs.log, DiagnosisSettings())
     rng = np.random.default_rng(3)
-    return remainder(search.data, fit(search.data), rng, search.candidates)
+    return remainder(search.data, fit(search.data), rng, search.proposals.candidates)
 
 
 def test_what_is_left_in_the_span_of_the_dictionary_is_seen(tmp_path: Path) -> None:

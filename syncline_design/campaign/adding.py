@@ -11,7 +11,7 @@ from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_o
 from syncline_design.diagnosis.consequence import SpecPromise
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.run import SearchedLog, examined, weigh
-from syncline_design.diagnosis.search import DiagnosisSettings, SearchProgress, silent
+from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.sufficient import sufficient
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry

@@ -21,7 +21,7 @@ from syncline_design.campaign.telling import Told, tell
 from syncline_design.campaign.twice import is_same
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.result import Diagnosis
-from syncline_design.diagnosis.search import DiagnosisSettings, SearchProgress, silent
+from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread

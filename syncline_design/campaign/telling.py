@@ -37,7 +37,7 @@ from syncline_design.diagnosis.result import (
 )
 from syncline_design.diagnosis.run import provenance_of
 from syncline_design.diagnosis.same_system import description
-from syncline_design.diagnosis.search import DiagnosisSettings
+from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.sight import DetectionLimit, alone, informative
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects import registry

@@ -46,7 +46,7 @@ from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.finding import estimate
 from syncline_design.diagnosis.result import SpecRead
-from syncline_design.diagnosis.search import DiagnosisSettings, SearchProgress, silent
+from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force

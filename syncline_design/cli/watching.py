@@ -61,7 +61,7 @@ def watch(
                "takes `watch STORE --accept`")  # fmt: skip
     from syncline_design.campaign.watching import WatchRequest
     from syncline_design.campaign.watching import watch as watch_runs
-    from syncline_design.diagnosis.search import DiagnosisSettings
+    from syncline_design.diagnosis.settings import DiagnosisSettings
     from syncline_design.report.on_watch import WATCH_FORMATS, on_watch, render_watch
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load

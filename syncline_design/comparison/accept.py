@@ -34,7 +34,7 @@ from syncline_design.comparison.shapes import once_changed
 from syncline_design.comparison.stamp_meaning import held_against
 from syncline_design.comparison.suspects import grouped
 from syncline_design.diagnosis.built import sighted
-from syncline_design.diagnosis.search import DiagnosisSettings
+from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case

@@ -20,7 +20,7 @@ from syncline_design.diagnosis.noise_split import NoiseFactors, factors
 from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import SearchedLog, examined, told
-from syncline_design.diagnosis.search import DiagnosisSettings
+from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.stretches import Stands, Stretches, left_as_one, stretches
 from syncline_design.diagnosis.system import Measured, measured
@@ -99,7 +99,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
 def _seen(one: SearchedLog) -> Stretches:
     in_force().doing("looking at stretches of the log")
     model = _built_in_undone(one)
-    free = one.search.free_signatures(model)
+    free = one.search.proposals.free_signatures(model)
     return stretches(one.data, model, free, one.search.settings.seed)
 
 

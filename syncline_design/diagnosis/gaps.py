@@ -51,10 +51,10 @@ def whole_gap(
 
 def _placebo(data: Data, search: Search, result: SearchResult, untouched: Array | None) -> Gap:
     """The gap with one more effect, drawn from those that were not chosen."""
-    free = [s for s in search.free_signatures(result.model) if s.plain]
+    free = [s for s in search.proposals.free_signatures(result.model) if s.plain]
     if not free or not result.model.labels:
         return Gap(added="")
-    chosen = free[int(search.rng.integers(len(free)))]
+    chosen = free[int(search.proposals.rng.integers(len(free)))]
     name, sensor, _ = chosen.candidate.label
     columns = np.nan_to_num(chosen.columns)
     found = gap(data, result.model, block_folds(data), columns, untouched)

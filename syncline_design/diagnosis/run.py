@@ -57,14 +57,8 @@ from syncline_design.diagnosis.result import (
 )
 from syncline_design.diagnosis.same_system import description
 from syncline_design.diagnosis.scene import scene
-from syncline_design.diagnosis.search import (
-    DiagnosisSettings,
-    Search,
-    SearchProgress,
-    SearchResult,
-    silent,
-    start_search,
-)
+from syncline_design.diagnosis.search import Search, SearchResult, start_search
+from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.shared_stamps import with_shared_stamps
 from syncline_design.diagnosis.shown_noise import with_shown_noise
 from syncline_design.diagnosis.sight import informative, smallest_seen
@@ -257,7 +251,7 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     """Findings and remainder of a settled model, each with whether it matters."""
     data, search, result, faults = one.data, one.search, one.result, one.faults
     untouched = one.untouched
-    rest = remainder(data, result.model, search.rng, search.candidates)
+    rest = remainder(data, result.model, search.proposals.rng, search.proposals.candidates)
     left = rest.p < REMAINDER_SHARE * search.settings.false_alarm_rate
     weights = weighed(promise, data)
     named = findings(result.final, faults, weights, left)
@@ -386,7 +380,7 @@ def _unseen(
     data: Data, search: Search, result: SearchResult, exclude: Sequence[str]
 ) -> tuple[str, ...]:
     """What this log could not show, and what it would show by its noise alone."""
-    hidden = unseen(data, result.model, search.free_signatures(result.model))
+    hidden = unseen(data, result.model, search.proposals.free_signatures(result.model))
     by_noise = (f"{c.effect.name} ({c.sensor})" for c in hidden_by_noise(data.view, exclude))
     return (*hidden, *_unseen_parts(result), *dict.fromkeys(by_noise))
 

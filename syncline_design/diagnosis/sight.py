@@ -54,10 +54,12 @@ def smallest_seen(search: Search, result: SearchResult) -> tuple[DetectionLimit,
         for one in (*compared.aliases, *compared.lookalikes)
     }
     free = [
-        s for s in search.free_signatures(model) if s.plain and s.candidate.label not in doubles
+        s
+        for s in search.proposals.free_signatures(model)
+        if s.plain and s.candidate.label not in doubles
     ]
     judged = search.states.judged(model, [s.columns for s in free]) if free else []
-    log_p = search.chance(len({s.candidate.label for s in search.signatures}))
+    log_p = search.proposals.chance(len({s.candidate.label for s in search.signatures}))
     found: list[DetectionLimit] = []
     for s, one in zip(free, judged, strict=True):
         found += _of(search, s, one, log_p)
