@@ -8,8 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import NoVerdict
+from syncline_design.planning import enough
+from syncline_design.planning.drives import World
 from syncline_design.planning.effort import Effort
+from syncline_design.planning.placing import LegTold
 from syncline_design.planning.run import plan as planned
 from syncline_design.planning.search import Others, PlanJudge
 from syncline_design.planning.setup import PlanRequest
@@ -124,9 +128,9 @@ def test_what_another_effect_would_take_is_not_reached_yet() -> None:
     one = np.array([[1.0, r, 0.0], [r, 1.0, 0.0], [0.0, 0.0, 0.0]])
     alone, needed = tolerance**-2.0, (2.0 * tolerance) ** -2.0 / (1.0 - r**2)
     assert needed > 10.0 * alone
-    for times, enough in ((1.01 * alone, False), (0.99 * needed, False), (1.01 * needed, True)):
-        assert judge.enough(times * one) is enough
-        assert judge.confusing(times * one) == ([] if enough else [1])
+    for times, sure in ((1.01 * alone, False), (0.99 * needed, False), (1.01 * needed, True)):
+        assert judge.enough(times * one) is sure
+        assert judge.confusing(times * one) == ([] if sure else [1])
     assert times_needed(judge, one) == pytest.approx(needed, rel=0.005)
     line = Lines("line", one[None], np.array([20.0]), np.array([0.0]))
     assert legs_needed(judge, line) == math.ceil(needed)
@@ -139,3 +143,28 @@ def test_a_search_ends_where_its_effort_does(tmp_path: Path) -> None:
         asked(tmp_path, 60.0, effort)
     assert effort.is_over
     assert effort.spent < 60
+
+
+def test_whole_drives_count_and_what_is_only_better_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A search of limited effort is enough as well, takes longer drives, and judges fewer whole."""
+    judged: list[int] = []
+    whole = enough.whole_information
+
+    def counted(world: World, legs: list[LegTold]) -> Array:
+        judged.append(len(legs))
+        return whole(world, legs)
+
+    monkeypatch.setattr(enough, "whole_information", counted)
+    free = asked(tmp_path, 0.2)
+    without = len(judged)
+    effort = Effort(most=3000)
+    limited = asked(tmp_path, 0.2, effort)
+    assert 0 < len(judged) - without < 0.5 * without
+    least, more = free.result.least_minutes, limited.result.least_minutes
+    assert least is not None
+    assert more is not None
+    assert least <= more < 1.3 * least
+    assert asked(tmp_path, more + 1e-6).result.reached
+    assert effort.is_half_over

@@ -19,6 +19,7 @@ import numpy as np
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.drives import whole_information
+from syncline_design.planning.effort import Effort
 from syncline_design.planning.placing import LegTold, lasting_s
 from syncline_design.planning.search import LegSearch, reaching
 from syncline_design.planning.setup import Setup
@@ -47,7 +48,7 @@ class Shortest:
 
 def shortest(setup: Setup, search: LegSearch, most_s: float) -> Shortest:
     """The shortest drive of at most so much time that is enough."""
-    tried, whole = _Margins(search.margin), _Whole(setup)
+    tried, whole = _Margins(search.margin), _Whole(setup, search.effort)
     found: list[list[LegTold]] = []
     for _ in range(TRIED):
         drives = reaching(search.at(tried.now), most_s)
@@ -66,10 +67,13 @@ def shortest(setup: Setup, search: LegSearch, most_s: float) -> Shortest:
 
 def _passed_by(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTold]:
     """The shortest drive that is enough, of this one and of those that the search has looked at,
-    as many as may be judged; what falls short by its legs alone the least is judged first."""
+    as many as may be judged; what falls short by its legs alone the least is judged first.
+
+    A search of limited effort leaves them where it has spent half of it.
+    """
     left = MOST_PASSED_BY
     for legs in search.looked_at(lambda one: float(np.max(one.every, initial=0.0)), PASSED_BY):
-        if not left or search.deadline.is_over:
+        if not left or search.deadline.is_over or search.effort.is_half_over:
             break
         if lasting_s(legs) < lasting_s(enough) - 1e-6 and search.fits(legs):
             left -= 1
@@ -104,6 +108,7 @@ class _Whole:
     """What drives judged whole reach of what is asked, each judged once."""
 
     setup: Setup
+    effort: Effort
     known: dict[tuple[int, ...], float] = field(default_factory=dict)
 
     def worst(self, legs: list[LegTold]) -> float:
@@ -111,7 +116,9 @@ class _Whole:
         key = tuple(map(id, legs))
         if key not in self.known:
             in_force().check()
-            world = self.setup.world.coarse(lasting_s(legs))
+            lasts_s = lasting_s(legs)
+            world = self.setup.world.coarse(lasts_s)
+            self.effort.look_at(world.computed_hz * lasts_s)
             information = whole_information(world, legs)
             ratios = self.setup.judge.ratios(information, exact=True)
             every = [*ratios, *self.setup.judge.confusions(information)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import field
 from typing import Final
 
 from syncline_design.effects.record import Array
@@ -28,6 +29,30 @@ class Swept:
     moved_m: Place = (0.0, 0.0)
     box_m: Box = (0.0, 0.0, 0.0, 0.0)
 
+    def begun_at(self, quarter: int) -> Swept:
+        """The same begun to another quarter of the compass."""
+        south, north, west, east = self.box_m
+        corners = [_turned((n, e), quarter) for n in (south, north) for e in (west, east)]
+        norths, easts = zip(*corners, strict=True)
+        box = (min(norths), max(norths), min(easts), max(easts))
+        return Swept(_turned(self.moved_m, quarter), box)
+
+    def then(self, other: Swept) -> Swept:
+        """Both, the other from where this one ends."""
+        (north, east), (more, off) = self.moved_m, other.moved_m
+        return Swept((north + more, east + off), around(self.box_m, self.moved_m, other.box_m))
+
+
+def around(box: Box, at: Place, own: Box) -> Box:
+    """What was taken, and what is taken from a place on as well."""
+    north, east = at
+    return (
+        min(box[0], north + own[0]),
+        max(box[1], north + own[1]),
+        min(box[2], east + own[2]),
+        max(box[3], east + own[3]),
+    )
+
 
 STILL: Final = Swept()
 
@@ -39,6 +64,17 @@ class Room:
 
     area_m: Place
     turns: tuple[Swept, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One way to drive a leg: which of the four headings it has, the turn to it [rad] and its time
+    [s], and what turn and leg take from where the turn begins."""
+
+    heading: int
+    turn_rad: float
+    turn_s: float
+    swept: Swept
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,28 +96,42 @@ class LegTold:
     turns_s: tuple[float, float]
     room: Room | None = None
 
+    _known: dict[float, tuple[Way, ...]] = field(default_factory=dict, repr=False, compare=False)
+
     @property
     def area_m(self) -> Place | None:
         """North and east extent within which its vehicle has to stay."""
         return None if self.room is None else self.room.area_m
 
-    def turn_s(self, angle_rad: float) -> float:
-        """Time of the turn to its heading."""
+    def ways_from(self, heading_rad: float) -> tuple[Way, ...]:
+        """Every way that it can be driven after a leg that ended at this heading; worked out once,
+        for a search places the same few legs again and again."""
+        found = self._known.get(heading_rad)
+        if found is None:
+            found = self._known[heading_rad] = tuple(self._ways(heading_rad))
+        return found
+
+    def _ways(self, heading_rad: float) -> Iterator[Way]:
+        """At each of the four headings; a turn about goes either way round."""
+        for heading in range(4):
+            angle = math.remainder(QUARTER_RAD * heading - heading_rad, 2.0 * math.pi)
+            yield self._way(heading, angle)
+            if self.room is not None and abs(round(angle / QUARTER_RAD)) == ABOUT:
+                yield self._way(heading, angle - math.copysign(2.0 * math.pi, angle))
+
+    def _way(self, heading: int, turn_rad: float) -> Way:
+        turned = round(turn_rad / QUARTER_RAD)
+        turn = STILL if self.room is None else self.room.turns[ABOUT + turned]
+        begun = turn.begun_at((heading - turned) % 4)
+        return Way(
+            heading, turn_rad, self._turn_s(turn_rad), begun.then(self.swept.begun_at(heading))
+        )
+
+    def _turn_s(self, angle_rad: float) -> float:
+        """Time of a turn."""
         straight, about = self.turns_s
         share = abs(math.remainder(angle_rad, 2.0 * math.pi)) / math.pi
         return straight + share * (about - straight)
-
-    def turn(self, angle_rad: float) -> Swept:
-        """What the turn to its heading takes, begun northwards."""
-        if self.room is None:
-            return STILL
-        return self.room.turns[ABOUT + round(angle_rad / QUARTER_RAD)]
-
-    def ways(self, angle_rad: float) -> tuple[float, ...]:
-        """The turns that lead to its heading: a turn about goes either way round."""
-        if self.room is None or abs(round(angle_rad / QUARTER_RAD)) < ABOUT:
-            return (angle_rad,)
-        return angle_rad, angle_rad - math.copysign(2.0 * math.pi, angle_rad)
 
     def at(self, heading: int, start_s: float) -> Array:
         """Information of the leg when it begins so late."""
@@ -106,15 +156,6 @@ class Placed:
         """When it ends."""
         return self.start_s + self.told.leg.duration_s
 
-    @property
-    def courses(self) -> tuple[tuple[int, Swept], tuple[int, Swept]]:
-        """Turn and leg: the quarter of the compass that each begins to, and what it takes."""
-        turned = round(self.turn_rad / QUARTER_RAD)
-        return (
-            ((self.heading - turned) % 4, self.told.turn(self.turn_rad)),
-            (self.heading, self.told.swept),
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class LegsEnd:
@@ -130,14 +171,22 @@ class LegsEnd:
     def then(self, told: LegTold) -> tuple[Placed, LegsEnd]:
         """One more leg, at the heading that ends nearest to the start, the way back first; within
         its area where some way is."""
-        ways = list(self._ways(told))
+        ways = told.ways_from(self.heading_rad)
+        (north, east), about = self.place_m, self.before + 2
         costs = [
-            round(math.hypot(*end) + 1e-6 * ((h - self.before - 2) % 4), 5) for h, _, end in ways
+            round(
+                math.hypot(north + one.swept.moved_m[0], east + one.swept.moved_m[1])
+                + 1e-6 * ((one.heading - about) % 4),
+                5,
+            )
+            for one in ways
         ]
+        if told.room is None:
+            return self._placed(told, ways[costs.index(min(costs))])
         order = sorted(range(len(ways)), key=costs.__getitem__)
-        found = (self._placed(told, *ways[k]) for k in order)
+        found = (self._placed(told, ways[k]) for k in order)
         fitting = (one for one in found if one[1].within(told.area_m))
-        return next(fitting, None) or self._placed(told, *ways[order[0]])
+        return next(fitting, None) or self._placed(told, ways[order[0]])
 
     @property
     def extent_m(self) -> Place:
@@ -151,39 +200,14 @@ class LegsEnd:
             own <= AREA_SHARE * most for own, most in zip(self.extent_m, area_m, strict=True)
         )
 
-    def _ways(self, told: LegTold) -> Iterator[tuple[int, float, Place]]:
-        """Heading, turn to it and where the leg ends, of every way that it can be driven."""
-        now = round(self.heading_rad / QUARTER_RAD) % 4
-        for heading in range(4):
-            north, east = _turned(told.swept.moved_m, heading)
-            angle = math.remainder(QUARTER_RAD * heading - self.heading_rad, 2.0 * math.pi)
-            for way in told.ways(angle):
-                on, off = _turned(told.turn(way).moved_m, now)
-                yield heading, way, (self.place_m[0] + on + north, self.place_m[1] + off + east)
-
-    def _placed(
-        self, told: LegTold, heading: int, angle: float, end_m: Place
-    ) -> tuple[Placed, LegsEnd]:
-        begins_rad = QUARTER_RAD * heading
-        placed = Placed(told, heading, angle, self.end_s + told.turn_s(angle))
-        box, at = self.box_m, self.place_m
-        for quarter, course in placed.courses:
-            box = _around(box, at, course, quarter)
-            on, off = _turned(course.moved_m, quarter)
-            at = (at[0] + on, at[1] + off)
-        return placed, LegsEnd(end_m, heading, begins_rad + told.turned_rad, placed.end_s, box)
-
-
-def _around(box: Box, at: Place, course: Swept, quarter: int) -> Box:
-    """What was taken, and what a course from a place takes as well."""
-    south, north, west, east = course.box_m
-    corners = [_turned((n, e), quarter) for n in (south, north) for e in (west, east)]
-    return (
-        min(box[0], *(at[0] + n for n, _ in corners)),
-        max(box[1], *(at[0] + n for n, _ in corners)),
-        min(box[2], *(at[1] + e for _, e in corners)),
-        max(box[3], *(at[1] + e for _, e in corners)),
-    )
+    def _placed(self, told: LegTold, way: Way) -> tuple[Placed, LegsEnd]:
+        placed = Placed(told, way.heading, way.turn_rad, self.end_s + way.turn_s)
+        (north, east), (more, off) = self.place_m, way.swept.moved_m
+        heading_rad = QUARTER_RAD * way.heading + told.turned_rad
+        box = around(self.box_m, self.place_m, way.swept.box_m)
+        return placed, LegsEnd(
+            (north + more, east + off), way.heading, heading_rad, placed.end_s, box
+        )
 
 
 def arranged(sequence: Sequence[LegTold]) -> tuple[Placed, ...]:

@@ -9,7 +9,7 @@ from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.planning.drives import WholeDrive, outcome, steered_s
-from syncline_design.planning.effort import Effort
+from syncline_design.planning.effort import ROWS_OF_A_DRIVE, Effort
 from syncline_design.planning.enough import shortest
 from syncline_design.planning.placing import AREA_SHARE, LegTold, lasting_s, way_of
 from syncline_design.planning.search import LegSearch, best_within, together
@@ -22,7 +22,6 @@ from syncline_design.planning.wanted import (
 from syncline_design.spec.case import Case
 
 LONGEST_S: Final = 4 * 3600.0  # of a drive that is looked for to say the least minutes
-ROWS_OF_A_DRIVE: Final = 50  # that take as long to look at as a drive by its legs
 SEARCH_SHARE: Final = 0.5  # of the command's time
 
 
