@@ -190,6 +190,40 @@ def test_the_proposed_block_holds_the_axes_that_the_globe_showed(tmp_path: Path)
     assert late_s == pytest.approx(LATE_S, abs=1e-3)
 
 
+@pytest.mark.parametrize("told", [False, True])
+@pytest.mark.parametrize("body", ["frd", "flu"])
+@pytest.mark.parametrize("axes", ["ned", "enu"])
+def test_body_axes_that_no_file_tells_are_those_that_are_upright(
+    tmp_path: Path, axes: str, body: str, told: bool
+) -> None:
+    """Whatever frame the globe shows or the spec tells: attitudes are the flown, and it is said."""
+    fixes = made.write_pos(tmp_path / "gnss.pos", FIXES)
+    place, turn = TRUTH.place, TRUTH.turn
+    if axes == "enu":
+        place, turn = TO_ENU.apply(place), TO_ENU * turn
+    if body == "flu":
+        turn = turn * TO_FLU
+    rows = [
+        f"{t // 10**9}.{t % 10**9:09d} " + " ".join(f"{v:.9f}" for v in (*at, *q))
+        for t, at, q in zip(TRUTH.stamp_ns.tolist(), place, turn.as_quat(), strict=True)
+    ]
+    reference = tmp_path / "ref.txt"
+    reference.write_text("\n".join(rows) + "\n")
+    origin = (math.radians(ORIGIN[0]), math.radians(ORIGIN[1]), ORIGIN[2])
+    known = {"frame": axes} if told else {}
+    choice = LogChoice.model_construct(origin=origin, **known)
+    log = read_log(row_sources([fixes, reference], choice, ["uav"], poses=False), ["uav"],
+                   needs_ranging=False, origin=origin)  # fmt: skip
+    base = TRUTH.stamp_ns[0] / 1e9
+    flown = Rotation.from_euler("ZYX", log.stages[0].euler_rad[:, ::-1])
+    at = np.searchsorted(TRUTH.stamp_ns / 1e9 - base, log.time_s - log.time_s[0])
+    apart = (TRUTH.turn[np.clip(at, 0, len(TRUTH) - 1)].inv() * flown).magnitude()
+    assert np.median(apart) < math.radians(6.0)  # rows are of other stamps, up to 0.1 s off
+    block = inspect_logs([fixes, reference], choice).proposal.log
+    assert (block.frame, block.body) == (axes, body)
+    assert any(f"(log: {{body: {body}}})" in n for n in log.notes) == (body == "frd")
+
+
 @pytest.mark.parametrize("told", [None, "utc", "gps"])
 def test_the_clock_of_week_seconds_is_the_specs_else_gps_and_said(
     tmp_path: Path, told: str | None

@@ -158,3 +158,13 @@ def test_no_line_ends_before_an_uncertainty() -> None:
 def test_no_line_ends_inside_a_figure_of_nats() -> None:
     told = unbroken("saves 13 436.0 nat; 3 000 rows, 2026 100 was 12 of 1000")
     assert told.replace("\u00a0", "_") == "saves 13_436.0_nat; 3_000 rows, 2026_100 was 12 of 1000"
+
+
+def test_two_moments_are_told_apart_however_late_they_are() -> None:
+    """To a hundredth of what lies between them, in figures that are read back."""
+    from_to = numbers.from_to
+    for begun, lasts in ((0.0, 43.5), (51203.37, 21.42), (345600.5, 0.83), (12.0, 0.004)):
+        ends = from_to(begun, begun + lasts).replace("\u00a0", "").split(" to ")
+        read = [float(end.removesuffix("s")) for end in ends]
+        assert read[1] - read[0] == pytest.approx(lasts, rel=0.02)
+    assert from_to(120.0, 130.0).replace("\u00a0", " ") == "120 s to 130 s"

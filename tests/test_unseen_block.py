@@ -17,6 +17,7 @@ from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.unseen_block import unseen_block
 from syncline_design.logs.log import Log
 from syncline_design.machine.linear_algebra import one_thread
+from syncline_design.report.numbers import from_to
 from syncline_design.report.on_gap import _unseen_text
 from syncline_design.spec.load import load
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario
@@ -65,9 +66,7 @@ def test_the_block_is_in_nothing_that_was_found_without_it(tmp_path: Path) -> No
     assert block.closed_fraction > 0.95
     words = _unseen_text(block)
     assert "names latency (position)" in words
-    assert f"from {block.from_s:.3g} s to {block.to_s:.3g} s" in words.replace(
-        "\N{NO-BREAK SPACE}", " "
-    )
+    assert from_to(block.from_s, block.to_s) in words
 
 
 def test_where_nothing_moves_the_mean_no_block_is_kept_back(tmp_path: Path) -> None:

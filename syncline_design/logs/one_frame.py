@@ -27,7 +27,10 @@ from syncline_design.logs.stream_values import (
     ENU_TO_NED,
     GLOBE,
     StreamValues,
+    body_untold,
+    hangs,
     height_of,
+    rolled_over,
     separation_of,
 )
 from syncline_design.model.figure_text import to_digits, to_places
@@ -112,8 +115,12 @@ def _with_fitting_axes(one: StreamValues, globe: StreamValues, origin: Array) ->
     if one.has(ATTITUDE):
         turned = ENU_TO_NED @ euler_to_rotation(one.vectors(ATTITUDE))
         one.put(ATTITUDE, rotation_to_euler(turned))
-    one.notes[:] = [n for n in one.notes if "the frame is not told" not in n and
-                    "positions in east, north, up" not in n]  # fmt: skip
+        if one.shown_body is not None and hangs(turned):
+            one.notes[:] = [n for n in one.notes if "the body axes are not told" not in n]
+            rolled_over(one)
+            one.note(body_untold(one))
+    made = ("the frame is not told", "in east, north, up were made", "frame east, north, up)")
+    one.notes[:] = [n for n in one.notes if not any(words in n for words in made)]
     one.note(
         f"the frame is not told: as east, north, up it is {to_digits(left[0], 3)} m from "
         f"{globe.offer.name}, as north, east, down {to_digits(left[1], 3)} m: taken as the latter "

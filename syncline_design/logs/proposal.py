@@ -11,7 +11,7 @@ from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.reading import read_log
 from syncline_design.logs.roles import ROLES, Offer, Part, Role, Sureness, parts_of
 from syncline_design.logs.run_parts import one_run
-from syncline_design.logs.stream_sources import is_pose_pair, left_of, sources_of
+from syncline_design.logs.stream_sources import StreamSource, is_pose_pair, left_of, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
@@ -116,12 +116,12 @@ def _of_streams(
 ) -> Proposal:
     """Of recordings, for the parts that no table beside them plays."""
     parts = left_of(parts_of(offers, choice, surveyed="target" in files.held), files.held)
-    lacking, conversions, shows = _tried(offers, files, choice, poses)
+    lacking, conversions, sources = _tried(offers, files, choice, poses)
     shown = _used(parts, poses)
     named = {role: part for role, part in shown.items() if role in _NAMED or part.sure == "stated"}
     block = ProposedBlock(
         {role: _name(part.offer, offers) for role, part in named.items()} if shown else None,
-        choice.timeline, choice.gps_week, *_axes(shown, choice, shows),
+        choice.timeline, choice.gps_week, *_axes(shown, choice, sources),
     )  # fmt: skip
     return Proposal(
         kind=None if lacking else _kind({*shown, *files.held}, is_pose_pair(shown) and poses),
@@ -139,17 +139,14 @@ def _of_streams(
 
 def _tried(
     offers: Sequence[Offer], files: SortedFiles, choice: LogChoice, poses: bool
-) -> tuple[tuple[str, ...], tuple[str, ...], bool]:
-    """What keeps the mapping from working, else everything that it does to the values.
-
-    And whether places in WGS 84 showed axes that a file does not tell.
-    """
+) -> tuple[tuple[str, ...], tuple[str, ...], Sequence[StreamSource]]:
+    """What keeps the mapping from working, else all that it does to the values, and these."""
     try:
         sources = sources_of(offers, choice, "", poses, files.held, files.survey)
     except BadInput as error:
-        return (str(error),), (), False
+        return (str(error),), (), ()
     notes = tuple(dict.fromkeys(note for one in sources for note in one.notes))
-    return (), notes, any(one.shown == "ned" for one in sources)
+    return (), notes, sources
 
 
 def _used(parts: dict[Role, Part], poses: bool) -> dict[Role, Part]:
@@ -175,12 +172,13 @@ def _name(offer: Offer, offers: Sequence[Offer]) -> str:
 
 
 def _axes(
-    parts: dict[Role, Part], choice: LogChoice, shows: bool
+    parts: dict[Role, Part], choice: LogChoice, sources: Sequence[StreamSource]
 ) -> tuple[Literal["enu", "ned"] | None, Literal["flu", "frd"] | None]:
     """Frame and body as stated; where a stream in use does not tell, the assumed, to be seen.
 
-    shows: places in WGS 84 showed one such stream to be north, east, down; beside another that
-    does not tell, the block has one word for both and says none: `diagnose` looks again.
+    Places in WGS 84 may have shown one such stream to be north, east, down; beside another that
+    does not tell, the block has one word for both and says none: `diagnose` looks again.  So for
+    body axes, where one of two streams would be upside down.
     """
     frame, body = choice.frame, choice.body
     streams = list({id(p.offer): p.offer.stream for p in parts.values()}.values())
@@ -188,9 +186,12 @@ def _axes(
     untold = [s for s in streams if s.frame == "unknown" and local & set(s.columns)]
     if untold and frame is None:
         seen: Literal["ned"] | None = "ned" if len(untold) == 1 else None
+        shows = any(one.shown == "ned" for one in sources)
         frame = seen if shows else ASSUMED_FRAME
     if any(s.body == "unknown" and "quaternion_w" in s.columns for s in streams):
-        body = body or ASSUMED_BODY
+        taken = {one.shown_body for one in sources if one.shown_body is not None}
+        only = ASSUMED_BODY if not taken else taken.pop() if len(taken) == 1 else None
+        body = body or only
     return frame, body
 
 

@@ -55,12 +55,14 @@ class StreamSource:
     def __init__(self, path: Path, name: str, time_ns: Nanoseconds, calendar: bool,
                  columns: Mapping[str, Array], notes: Sequence[str],
                  shown: Literal["ned"] | None = None,
+                 shown_body: Literal["flu", "frd"] | None = None,
                  laid: Turns | None = None) -> None:  # fmt: skip
         self.path = path.joinpath(name.strip("/").replace("/", "."))
         self.header = ("time_s", *columns)
         self.cut = 0
         self.notes = tuple(notes)
         self.shown = shown  # axes that the file does not tell, as other places show them
+        self.shown_body = shown_body  # and those of the body, as they are taken
         self.laid: Turns | None = laid  # how it was turned, beside shifted, onto another's frame
         self._time_ns, self._calendar, self._columns = time_ns, calendar, columns
 
@@ -233,7 +235,7 @@ def _source(
     if "ranging" in roles and TARGET_ID in one.columns:
         columns[TARGET_ID] = one.columns[TARGET_ID]
     return StreamSource(one.offer.path, one.offer.name, one.time_ns, calendar, columns, one.notes,
-                        one.shown, laid)  # fmt: skip
+                        one.shown, one.shown_body, laid)  # fmt: skip
 
 
 _ROLE_COLUMNS: Final[Mapping[Role, tuple[str, ...]]] = {

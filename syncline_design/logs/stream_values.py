@@ -34,6 +34,7 @@ GLOBE: Final = ("latitude_rad", "longitude_rad")
 ORIGIN: Final = ("origin_latitude_rad", "origin_longitude_rad", "origin_height_msl_m")
 ASSUMED_FRAME: Final[Literal["enu"]] = "enu"
 ASSUMED_BODY: Final[Literal["flu"]] = "flu"
+HANGS: Final = -0.5  # mean of down of the body along down, below which it is upside down
 _FRAMES: Final = {"enu": "east, north, up", "ned": "north, east, down", "utm": "UTM"}
 _BODIES: Final = {"flu": "forward, left, up", "frd": "forward, right, down"}
 
@@ -43,7 +44,8 @@ class StreamValues:
     """A stream's samples: stamps as in the file, canonical SI columns, and what was done to them.
 
     latitude_rad, longitude_rad, height_m stand as they are; everything else is local.  assumed:
-    axes that neither the log nor the spec tells.  shown: those that other places tell instead.
+    axes that neither the log nor the spec tells.  shown, shown_body: what other places, and gravity
+    on the way, tell instead; shown_body is None where the body axes are told.
     """
 
     offer: Offer
@@ -53,6 +55,7 @@ class StreamValues:
     origin: Array | None = None  # latitude, longitude [rad], height [m] of the local frame
     assumed: bool = False
     shown: Literal["ned"] | None = None
+    shown_body: Literal["flu", "frd"] | None = None
 
     def has(self, names: Sequence[str]) -> bool:
         return all(name in self.columns for name in names)
@@ -102,7 +105,7 @@ def values_of(offer: Offer, pieces: Sequence[Piece], choice: LogChoice) -> Strea
     for words in offer.stream.notes:  # what its reader did
         found.note(words)
     frame, body = _axes(found, choice)
-    turn = _attitude(found, frame, body)
+    turn, body = _attitude(found, frame, body)
     _position(found, frame)
     _velocity(found, frame, body, turn)
     _rates(found, body)
@@ -152,9 +155,7 @@ def _axes(values: StreamValues, choice: LogChoice) -> tuple[Frame, Body]:
         body = choice.body or ASSUMED_BODY
         if choice.body is None:
             values.assumed = True
-            values.note(
-                f"the body axes are not told: {_BODIES[body]} is assumed (log: {{body: ...}})"
-            )
+            values.shown_body = body
     return frame, body
 
 
@@ -166,8 +167,27 @@ def _to_frd(body: Body) -> Array:
     return FLU_TO_FRD if body == "flu" else np.eye(3)
 
 
-def _attitude(values: StreamValues, frame: Frame, body: Body) -> Array | None:
-    """Roll, pitch, yaw from a quaternion; gives the rotations body to NED, where they are told."""
+def hangs(turn: Array) -> bool:
+    """Whether a body is upside down on the way, by its axes in north, east, down, (n, 3, 3)."""
+    down = turn[:, 2, 2]
+    known = down[np.isfinite(down)]
+    return bool(known.shape[0]) and float(np.mean(known)) < HANGS
+
+
+def rolled_over(values: StreamValues) -> None:
+    """Attitudes and rates by the other body axes: right for left, and down for up."""
+    values.shown_body = "frd" if values.shown_body == "flu" else "flu"
+    if values.has(ATTITUDE):
+        turned = euler_to_rotation(values.vectors(ATTITUDE)) @ FLU_TO_FRD
+        values.put(ATTITUDE, rotation_to_euler(turned))
+    if values.has(RATE):
+        values.put(RATE, values.vectors(RATE) @ FLU_TO_FRD)
+
+
+def _attitude(values: StreamValues, frame: Frame, body: Body) -> tuple[Array | None, Body]:
+    """Roll, pitch, yaw from a quaternion; gives the rotations body to NED, where they are told, and
+    the body axes: of those that nothing tells the ones in which it is upright."""
+    turn: Array | None = None
     if values.has(QUATERNION):
         from scipy.spatial.transform import Rotation
 
@@ -175,20 +195,34 @@ def _attitude(values: StreamValues, frame: Frame, body: Body) -> Array | None:
         known = np.isfinite(raw).all(axis=1) & (np.linalg.norm(raw, axis=1) > 0.5)
         whole = np.where(known[:, None], raw, np.array([1.0, 0.0, 0.0, 0.0]))
         given = Rotation.from_quat(whole[:, [1, 2, 3, 0]]).as_matrix()
-        turn: Array = _to_ned(frame) @ given @ _to_frd(body)
-        turn[~known] = np.nan
-        values.put(ATTITUDE, np.where(known[:, None], rotation_to_euler(turn), np.nan))
+        turn = np.where(known[:, None, None], _to_ned(frame) @ given @ _to_frd(body), np.nan)
+        if values.shown_body is not None and hangs(turn):
+            turn = turn @ FLU_TO_FRD
+            body = values.shown_body = "frd" if body == "flu" else "flu"
+        values.put(ATTITUDE, rotation_to_euler(turn))
         shown = "wgs84" if frame == "wgs84" else _FRAMES.get(frame, frame)
         values.note(f"quaternions (body {_BODIES[body]}, frame {shown}) were made roll, pitch, yaw")
         if not np.all(known):
             values.note(f"{int(np.sum(~known))} quaternions are none (zero or not finite)")
-        return turn
-    if values.has(ATTITUDE):
-        return euler_to_rotation(values.vectors(ATTITUDE))
-    if "heading_rad" in values.columns:
+    elif values.has(ATTITUDE):
+        turn = euler_to_rotation(values.vectors(ATTITUDE))
+    elif "heading_rad" in values.columns:
         values.columns.setdefault(ATTITUDE[2], values.columns["heading_rad"])
         values.note("the heading was read as yaw")
-    return None
+    if values.shown_body is not None:
+        values.note(body_untold(values))
+    return turn, body
+
+
+def body_untold(values: StreamValues) -> str:
+    """That nothing tells the body axes, and what they are taken for."""
+    body = values.shown_body or ASSUMED_BODY
+    if body == ASSUMED_BODY:
+        return f"the body axes are not told: {_BODIES[body]} is assumed (log: {{body: ...}})"
+    return (
+        f"the body axes are not told: as {_BODIES[ASSUMED_BODY]} it would be upside down, taken "
+        f"as {_BODIES[body]} (log: {{body: {body}}})"
+    )
 
 
 def _position(values: StreamValues, frame: Frame) -> None:

@@ -11,6 +11,7 @@ from syncline_design.model.figure_text import (
     format_duration,
     format_estimate,
     format_quantity,
+    to_digits,
     to_places,
 )
 from syncline_design.model.quantity import Dimension
@@ -84,8 +85,13 @@ def duration(seconds: float) -> str:
 
 
 def from_to(from_s: float, to_s: float) -> str:
-    """Two moments of a log, `120 s to 130 s`."""
-    return f"{si_quantity(from_s, 's')} to {si_quantity(to_s, 's')}"
+    """Two moments of a log, `120 s to 130 s`; to a hundredth of what lies between them at least."""
+    between = abs(to_s - from_s)
+    lost = sum(abs(float(to_digits(end, 4)) - end) for end in (from_s, to_s))
+    if lost <= 0.01 * between or not math.isfinite(between):
+        return f"{si_quantity(from_s, 's')} to {si_quantity(to_s, 's')}"
+    places = max(2 - math.floor(math.log10(between)), 0)
+    return " to ".join(typeset(f"{to_places(end, places)} s") for end in (from_s, to_s))
 
 
 def like(shown: str, value: float, digits: int = 4) -> str:

@@ -204,8 +204,7 @@ def finding_node(found: Finding, drive: NextDrive | None = None, *, first: bool 
 
 def _stretch_text(one: Stretch) -> str:
     """`64 ms from 0 s to 43.5 s`."""
-    ends = " to ".join(numbers.si_quantity(end, "s", 3) for end in (one.from_s, one.to_s))
-    return f"{one.text} from {ends}"
+    return f"{one.text} from {numbers.from_to(one.from_s, one.to_s)}"
 
 
 def spaced(name: str) -> str:

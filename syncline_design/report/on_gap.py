@@ -72,7 +72,7 @@ def _unseen_text(block: UnseenBlock | None) -> str:
     """What was found without a block, and how the block looks with it."""
     if block is None:
         return ""
-    ends = " to ".join(numbers.si_quantity(end, "s", 3) for end in (block.from_s, block.to_s))
+    ends = numbers.from_to(block.from_s, block.to_s)
     found = sentence_list(list(block.found)) or "nothing"
     closed = block.closed_fraction
     share = (
