@@ -85,7 +85,8 @@ def _wrong(receive: Nanoseconds, late: Nanoseconds) -> NDArray[np.bool_]:
         beside = [k for k in (begin - 1, end) if 0 <= k < receive.size]
         apart = np.abs(receive[begin:end, None] - receive[beside]).min(axis=1) > far
         own, low, high = stamp[begin:end], stamp[beside].min(), stamp[beside].max()
-        steady = (own > low - far - usual) & (own < high + far + usual)
+        beyond = far + usual if at_end else far  # an end has a neighbour on one side alone
+        steady = (own > low - beyond) & (own < high + beyond)
         wrong[begin:end] = away & apart & steady & (at_end or not _set_between(*sides))
     return wrong
 
