@@ -5,6 +5,7 @@ Oracles: Bayes factors by the dense normal density of scipy, and counting.
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -181,6 +182,20 @@ def test_one_day_far_off_rings_where_its_runs_agreed_and_not_where_they_do_not()
     assert evidence(calm, 0.0) < 0.0
     assert evidence(calm, 7.5) > np.log(20.0)
     assert evidence(3.0 * calm, 7.5) < np.log(20.0)
+
+
+def test_the_evidence_of_a_large_change_does_not_end() -> None:
+    """20 bounds from the eleventh run on: every run says it again, however much was said before.
+
+    log B is beyond the logarithm of the largest double (709) by the runs after the eighteenth; what
+    differs from run to run is held against all of it.
+    """
+    change = np.array([20.0, 0, 0, 0, 0]) * BOUND
+    changes = Changes(pool_of(series(4, 24, change, 10), range(24)))
+    course = [changes.log_evidence(n)[0] for n in range(11, 25)]
+    assert all(later > before > 0.0 for before, later in itertools.pairwise(course))
+    place = [term.effect.name for term in changes.terms].index("latency")
+    assert changes.change(24, 10, place).log_factor > 1000.0
 
 
 def test_weights_of_all_runs_and_effects_share_the_false_alarms() -> None:

@@ -14,7 +14,6 @@ RUNS_KNOWN: Final = 17.0  # runs that the noise fitted counts for, against the s
 APART: Final = (1.0, 3.0)  # bounds of a run by which an effect may differ from run to run
 DIFFERING: Final = 0.3  # odds of some effect differing from run to run against none doing so
 ROUNDED: Final = 1e-12
-MOST_LOG: Final = 690.0  # exp of no more stays within a double (709), with room for a sum
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +82,7 @@ def log_bayes(normal: Array, score: Array, reach: Array) -> Array:
         size = np.linalg.slogdet(inner)[1]
         solved = np.linalg.solve(inner, turned[..., None])[..., 0]
         square = np.sum(turned * solved, axis=-1)
-    found: Array = np.minimum(0.5 * (square - size), MOST_LOG)
+    found: Array = 0.5 * (square - size)
     return found
 
 
