@@ -55,6 +55,7 @@ _QUEUE: Final = 64  # messages, which hardly a queue holds up
 _SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
 _BACK: Final = 0.3  # of a jump: what returns by more settles, and is no step
 _LEAST_SETS: Final = 6  # jumps that come in a beat
+_LEAST_EQUAL: Final = 4  # by one size
 _BEAT: Final = 0.1  # of the time between them
 _PARTS: Final = (1, 2, 3)  # of the least time between jumps
 _EQUAL: Final = 0.02
@@ -63,11 +64,15 @@ _SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in qu
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """Stamps gain `size_s` with the message at `place` (among the good ones), until `end`."""
+    """Stamps gain `size_s` with the message at `place` (among the good ones), until `end`.
+
+    again: one of many by one size, of a clock that is set again and again.
+    """
 
     place: int
     size_s: float
     end: int | None = None
+    again: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +134,40 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
     floor = max(noise, _SHARE * width)
     first = _sizes(pace, late, odd, odd[off_here[odd]], off_here, (width, floor))
     edges = np.asarray([j.place - 1 for j in first], np.intp)
-    return _sizes(pace, late, odd, edges, off_here, (width, floor))
+    found = _sizes(pace, late, odd, edges, off_here, (width, floor))
+    equal = _equal(pace, late, odd[off_here[odd]], (width, floor))
+    alone = {jump.place for jump in equal}
+    return sorted([*equal, *(j for j in found if j.place not in alone)], key=lambda j: j.place)
+
+
+def _equal(
+    pace: Cadence, late: Array, broken: NDArray[np.intp], limits: tuple[float, float]
+) -> list[Jump]:
+    """Jumps by one size, of a clock that is set again and again, which levels show together.
+
+    Each moves the level by less than a few delays tell; n of them tell it sqrt(n) times as well.
+    """
+    width, floor = limits
+    off = pace.interval[broken] - pace.steps[broken] * pace.period_s
+    near = max(_JITTER * pace.jitter_s, _LEAST_S)
+    rivals = [np.abs(off - one) <= max(near, _EQUAL * abs(one)) for one in off]
+    alike = max(rivals, key=lambda own: int(own.sum()), default=np.zeros(0, bool))
+    places = broken[alike]
+    if places.size < _LEAST_EQUAL:
+        return []
+    size = float(np.median(off[alike]))
+    clear_s = 3.0 / _LEVEL * math.sqrt(places.size) * abs(size)
+    bounds = [0, *(int(k) + 1 for k in places), late.size]
+    sides = zip(bounds, bounds[1:], bounds[2:], strict=False)
+    levels = [_level(late[a:k], late[k:b], width, clear_s) for a, k, b in sides]
+    told = [(moved, sure) for moved, sure in levels if sure > 0.0]
+    if len(told) < _LEAST_EQUAL:
+        return []
+    moved = float(np.mean([one for one, _ in told]))
+    sure = math.sqrt(sum(one**2 for _, one in told)) / len(told)
+    if abs(size) < max(floor, _LEVEL * sure) or abs(size + moved) > _ALIKE * abs(size) + 2.0 * sure:
+        return []
+    return [Jump(int(k) + 1, size, again=True) for k in places]
 
 
 def _around(off: Array) -> Array:
@@ -219,7 +257,8 @@ def _lasting(found: list[Jump], times: Array, late: Array) -> list[Jump]:
         level[jump.place :] += jump.size_s
     level = level - _slope(times, level) * (times - times[0])
     ends = [*(jump.place for jump in found[1:]), late.size]
-    return [j for j, end in zip(found, ends, strict=True) if not _settles(j, level[j.place : end])]
+    both = zip(found, ends, strict=True)
+    return [j for j, end in both if j.again or not _settles(j, level[j.place : end])]
 
 
 def _went_on(jump: Jump, settling: list[Jump], pace: Cadence) -> bool:

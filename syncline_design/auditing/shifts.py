@@ -141,9 +141,9 @@ def _slow_shifts(
     if told is not None:
         again = shapes_of(told, least_s=least_s, settling_s=settling_s)
         own = tuple(s for s in again if s.kind != "drift")
-    if len(own) < len(found):  # without what is transport, sizes are others
+    if told is None and len(own) < len(found):  # without what is transport, sizes are others
         own = polished(own, [True] * len(own), blocks)
-        own = own if told is not None else tuple(s for s in own if believed(s, blocks, least_s))
+        own = tuple(s for s in own if believed(s, blocks, least_s))
     own = witness.simplest(count, own, blocks)
     left = tuple(s for s in found if s not in own and s.kind not in ("step", "episode"))
     own = settled(own, time_s, late, blocks)
