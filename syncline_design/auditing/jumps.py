@@ -149,7 +149,7 @@ def _equal(
     """
     width, floor = limits
     off = pace.interval[broken] - pace.steps[broken] * pace.period_s
-    near = max(_JITTER * pace.jitter_s, _LEAST_S)
+    near = _JITTER * pace.jitter_s
     rivals = [np.abs(off - one) <= max(near, _EQUAL * abs(one)) for one in off]
     alike = max(rivals, key=lambda own: int(own.sum()), default=np.zeros(0, bool))
     places = broken[alike]
@@ -165,7 +165,8 @@ def _equal(
         return []
     moved = float(np.mean([one for one, _ in told]))
     sure = math.sqrt(sum(one**2 for _, one in told)) / len(told)
-    if abs(size) < max(floor, _LEVEL * sure) or abs(size + moved) > _ALIKE * abs(size) + 2.0 * sure:
+    least = max(floor, near / _ALIKE, _LEVEL * sure)
+    if abs(size) < least or abs(size + moved) > _ALIKE * abs(size) + 2.0 * sure:
         return []
     return [Jump(int(k) + 1, size, again=True) for k in places]
 

@@ -18,7 +18,7 @@ from syncline_design.auditing.cadence import Cadence, cadence
 from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.grains import timers
 from syncline_design.auditing.jumps import Jump, without_jumps
-from syncline_design.auditing.levels import believed, polished, shapes_of
+from syncline_design.auditing.levels import SURE, believed, polished, shapes_of
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds
@@ -141,9 +141,12 @@ def _slow_shifts(
     if told is not None:
         again = shapes_of(told, least_s=least_s, settling_s=settling_s)
         own = tuple(s for s in again if s.kind != "drift")
-    if told is None and len(own) < len(found):  # without what is transport, sizes are others
-        own = polished(own, [True] * len(own), blocks)
-        own = tuple(s for s in own if believed(s, blocks, least_s))
+    if len(own) < len(found):  # without what is transport, sizes are others
+        fitted = polished(own, [True] * len(own), blocks)
+        if told is None:
+            own = tuple(s for s in fitted if believed(s, blocks, least_s))
+        elif all(abs(s.size_s) > SURE * s.sigma_s for s in fitted):
+            own = fitted  # else the levels go with what is left out: stamps alone tell sizes
     own = witness.simplest(count, own, blocks)
     left = tuple(s for s in found if s not in own and s.kind not in ("step", "episode"))
     own = settled(own, time_s, late, blocks)
