@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from syncline_design.diagnosis import search
+from syncline_design.diagnosis import proposals, search
 from syncline_design.diagnosis.candidates import Candidate, Signature
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.instead import InQuestion, others_in_place
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.pairs import promising
 from syncline_design.diagnosis.scores import Gram, gram
+from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.effects import registry
 from tests.test_accept_stretches import settled, world
 from tests.world import hidden, make_log
@@ -112,7 +113,7 @@ def test_one_look_scores_each_noise_once(tmp_path: Path, monkeypatch: pytest.Mon
     spec = tmp_path / "spec.yaml"
     spec.write_text(log.spec_yaml(), "utf-8")
     data, model, free = settled(spec, log.to_csv(tmp_path / "log.csv"))
-    looked = search.start_search(data, search.DiagnosisSettings(), lambda _: None)
+    looked = search.start_search(data, DiagnosisSettings(), lambda _: None).proposals
     scores = gram(data, model, free, model.level)
     scored: list[NoiseLevel] = []
 
@@ -120,6 +121,6 @@ def test_one_look_scores_each_noise_once(tmp_path: Path, monkeypatch: pytest.Mon
         scored.append(level)
         return gram(data, model, of, level)
 
-    monkeypatch.setattr(search, "gram", counted)
+    monkeypatch.setattr(proposals, "gram", counted)
     assert looked.moving(model, scores, looked.threshold(scores)) is None
     assert len(scored) == len(set(scored)) == 1
