@@ -119,10 +119,7 @@ class _Whole:
             lasts_s = lasting_s(legs)
             world = self.setup.world.coarse(lasts_s)
             self.effort.look_at(world.computed_hz * lasts_s)
-            information = whole_information(world, legs)
-            ratios = self.setup.judge.ratios(information, exact=True)
-            every = [*ratios, *self.setup.judge.confusions(information)]
-            self.known[key] = float(max(every, default=0.0))
+            self.known[key] = self.setup.judge.worst(whole_information(world, legs))
         return self.known[key]
 
     def first_enough(self, drives: Sequence[list[LegTold]]) -> list[LegTold] | None:

@@ -133,8 +133,12 @@ class PlanJudge:
     def enough(self, information: Array) -> bool:
         """Whether all that is asked is reached, and told from every other effect: the one rule for
         whole drives, line plans and logs, however long they may last."""
-        worst = [*self.ratios(information, exact=True), *self.confusions(information)]
-        return bool(max(worst, default=0.0) <= 1.0)
+        return self.worst(information) <= 1.0
+
+    def worst(self, information: Array) -> float:
+        """The largest ratio to what is asked: 1 where it is just enough."""
+        every = [*self.ratios(information, exact=True), *self.confusions(information)]
+        return float(max(every, default=0.0))
 
     def confusions(self, information: Array) -> Array:
         """The largest share of any one other effect, by what is wanted."""
