@@ -110,19 +110,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     series = _continuous(series, disorder, found)
     continuous = replace(series, receive=raw.receive)
     grain = _grain(series, told, step_ns, found)
-    part = None if grain else arrival.arrived_in_part(series, cadence(series))
-    arrived = None if grain or part else arrival.stamped_on_arrival(series, cadence(series))
-    if part is not None:
-        found.append(part.fault)
-        series = replace(
-            series, good=series.good & ~np.isin(np.arange(series.good.size), part.places)
-        )
-    if arrived is not None:
-        found.append(_with_alike(series, arrived))
-    elif step_ns >= _LARGE_STEP_NS:  # duplicates are the unit's
-        series = order.without_duplicates(series).series
-    elif grain is None or not grain.explains_duplicates:
-        series = _take(order.without_duplicates(series), found)
+    series = _without_arrivals(series, grain, step_ns, found)
     spikes = order.without_spikes(series)
     series = _take(_beside(disorder, spikes), found)
     epoch = None if unit else epoch_fault(series)
@@ -153,6 +141,26 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     found, hidden = arrival.but_for_left_out(found, hidden, pace)
     one = _summed(stream, (raw, continuous, series), pace, found, (slips, moved), known)
     return replace(one, overtaken=disorder, copied=_copied(one), hidden=hidden)
+
+
+def _without_arrivals(
+    series: Series, grain: grains.Grain | None, step_ns: float, found: list[StampFault]
+) -> Series:
+    """Without stamps that were given on arrival, where some were, and without duplicates."""
+    part = None if grain else arrival.arrived_in_part(series, cadence(series))
+    arrived = None if grain or part else arrival.stamped_on_arrival(series, cadence(series))
+    if part is not None:
+        found.append(part.fault)
+        own = ~np.isin(np.arange(series.good.size), part.places)
+        series = replace(series, good=series.good & own)
+    if arrived is not None:
+        found.append(_with_alike(series, arrived))
+        return series
+    if step_ns >= _LARGE_STEP_NS:  # duplicates are the unit's
+        return order.without_duplicates(series).series
+    if grain is None or not grain.explains_duplicates:
+        return _take(order.without_duplicates(series), found)
+    return series
 
 
 def _late_or_coarse(found: Sequence[StampFault]) -> bool:
