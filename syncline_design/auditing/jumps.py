@@ -146,6 +146,8 @@ def _equal(
     """Jumps by one size, of a clock that is set again and again, which levels show together.
 
     Each moves the level by less than a few delays tell; n of them tell it sqrt(n) times as well.
+    late: receipt minus stamp (n,) [s]; broken: places of the intervals that no whole number of the
+    sensor's fills; limits: spread of the delays, and the least size that is named [s].
     """
     width, floor = limits
     off = pace.interval[broken] - pace.steps[broken] * pace.period_s

@@ -23,9 +23,9 @@ from syncline_design.machine.deadline import in_force
 
 EXACT = 2**52  # sums of whole amounts below it are exact as floats
 MOST_TRIED = 12  # options of a role near a design that does not stand
+TIED = 1e-11  # errors of one order: 12 figures
 
 Places = Sequence[int | None]  # of a design's options in another problem; None: gone
-TIED = 1e-11  # errors of one order: 12 figures
 
 
 class Beside:

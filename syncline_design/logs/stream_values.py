@@ -35,6 +35,7 @@ ORIGIN: Final = ("origin_latitude_rad", "origin_longitude_rad", "origin_height_m
 ASSUMED_FRAME: Final[Literal["enu"]] = "enu"
 ASSUMED_BODY: Final[Literal["flu"]] = "flu"
 HANGS: Final = -0.5  # mean of down of the body along down, below which it is upside down
+_OTHER: Final[Mapping[Body, Literal["flu", "frd"]]] = {"flu": "frd", "frd": "flu"}
 _FRAMES: Final = {"enu": "east, north, up", "ned": "north, east, down", "utm": "UTM"}
 _BODIES: Final = {"flu": "forward, left, up", "frd": "forward, right, down"}
 
@@ -176,7 +177,7 @@ def hangs(turn: Array) -> bool:
 
 def rolled_over(values: StreamValues) -> None:
     """Attitudes and rates by the other body axes: right for left, and down for up."""
-    values.shown_body = "frd" if values.shown_body == "flu" else "flu"
+    values.shown_body = _OTHER[values.shown_body or ASSUMED_BODY]
     if values.has(ATTITUDE):
         turned = euler_to_rotation(values.vectors(ATTITUDE)) @ FLU_TO_FRD
         values.put(ATTITUDE, rotation_to_euler(turned))
@@ -198,7 +199,7 @@ def _attitude(values: StreamValues, frame: Frame, body: Body) -> tuple[Array | N
         turn = np.where(known[:, None, None], _to_ned(frame) @ given @ _to_frd(body), np.nan)
         if values.shown_body is not None and hangs(turn):
             turn = turn @ FLU_TO_FRD
-            body = values.shown_body = "frd" if body == "flu" else "flu"
+            body = values.shown_body = _OTHER[values.shown_body]
         values.put(ATTITUDE, rotation_to_euler(turn))
         shown = "wgs84" if frame == "wgs84" else _FRAMES.get(frame, frame)
         values.note(f"quaternions (body {_BODIES[body]}, frame {shown}) were made roll, pitch, yaw")
