@@ -17,6 +17,7 @@ from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.reading import read_log
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
+from tests.flat_flight_logs import write_sbet
 from tests.flight_logs import Flight, flight, write_mcap, write_ros1, write_ros2, write_ulog
 
 LATE_S, NOISE_M = 0.08, 0.02
@@ -184,6 +185,30 @@ def test_two_trajectories_are_compared_pose_by_pose(tmp_path: Path) -> None:
     assert one.sentence.lower().startswith("position and attitude data are")
     entries = {(e.effect, e.sensor) for e in result.effects_entries()}
     assert entries == {("latency", "position"), ("latency", "attitude")}
+
+
+def test_poses_late_beside_velocities_of_the_better_system(tmp_path: Path) -> None:
+    """A trajectory 40 ms late beside an SBET, and a lever arm in the spec that is none.
+
+    With the arm in it, velocities of the SBET fit the tested places best as an antenna's: they are
+    the reference's all the same, and stamped as it is.
+    """
+    late = flight(60.0, 20.0, late_s=0.04, noise_m=NOISE_M)
+    files = tum(tmp_path / "slam.txt", late), write_sbet(tmp_path / "a.out", flight(60.0, 50.0))
+    more = "      lever_arm: [0.30 m, 0.05 m, -0.20 m]\n" + ATTITUDE
+    axes = "{frame: enu, body: flu, origin: [47.3 deg, 8.55 deg, 460 m]}"
+    result = found(tmp_path, *files, more=more, log=axes)
+    value, sigma = latency(result)
+    assert abs(value - 0.04) < 5.0 * sigma + 1e-3
+    causes = {(f.effect, f.sensor): f for f in result.findings if f.kind == "cause"}
+    assert set(causes) == {("latency", "position"), ("lever_arm", "position")}
+    assert causes["latency", "position"].also == ("attitude",)
+    arm = causes["lever_arm", "position"].parameters
+    for axis, true_m in zip("xyz", (-0.30, -0.05, 0.20), strict=True):
+        (part,) = [v for k, v in arm.items() if k.startswith(axis)]
+        assert part.standard_uncertainty is not None
+        assert abs(part.value - true_m) < 5.0 * part.standard_uncertainty + 1e-3
+    assert not [n for n in result.log.notes if "antenna's" in n or "another clock" in n]
 
 
 def test_ranges_in_a_table_stand_beside_a_bag(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from syncline_design.diagnosis.scene import Scene, less_sweep, scene
 from syncline_design.diagnosis.trajectory import SplinePieces
 from syncline_design.effects.kinematics import euler_to_rotation
 from syncline_design.effects.record import Array
-from syncline_design.logs.log import Log
+from syncline_design.logs.log import Log, StageLog
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_estimate
 
@@ -62,7 +62,7 @@ def with_shared_stamps(log: Log, view: Scene) -> Log:
     stages, notes = [], []
     for k, stage in enumerate(log.stages):
         rates, velocities = rates_apart(view, k), None
-        if k == 0 and not stage.follows_reference:
+        if k == 0 and not _of_the_better_system(stage):
             velocities = velocities_apart(view, k)
         stages.append(
             replace(
@@ -80,7 +80,7 @@ def _of_the_reference_point(log: Log, view: Scene) -> tuple[Log, Scene]:
     """Log and scene with velocities of the point that lever arms count from, where they are clearly
     the antenna's."""
     first, antenna = log.stages[0], view.rows[0].antenna_m
-    if first.follows_position or first.follows_reference or not np.any(antenna):
+    if first.follows_position or _of_the_better_system(first) or not np.any(antenna):
         return log, view
     seen = view.log
     own = less_sweep(seen, seen.stages[0], view.rows[0].rotation, antenna)
@@ -90,6 +90,11 @@ def _of_the_reference_point(log: Log, view: Scene) -> tuple[Log, Scene]:
     own = less_sweep(log, first, euler_to_rotation(first.euler_rad), antenna)
     note = f"velocities of {first.name} are its antenna's: the sweep of the arm was taken off them"
     return replace(log, stages=(own, *log.stages[1:]), notes=(*log.notes, note)), other
+
+
+def _of_the_better_system(stage: StageLog) -> bool:
+    """Velocities of which origin tells what stamps and what point they are of: the reference's."""
+    return stage.follows_reference or stage.velocity_of_reference
 
 
 def _gain(view: Scene, other: Scene) -> float:

@@ -35,8 +35,9 @@ class StageLog:
     velocity_mps (n, 3) NED, reference point; rate_radps (n, 3) body; range_m, azimuth_rad,
     elevation_rad (n,), None in a position log.  velocity_track, rate_track: where the motion was
     logged at a rate of its own.  follows_position, follows_reference: the velocity was derived from
-    antenna_m, from the better system's places.  velocity_of_position, rate_of_attitude: these carry
-    the stamps of the places, of the attitudes, and are as late.
+    antenna_m, from the better system's places.  velocity_of_reference: the better system logged it,
+    of its own reference point and with its own stamps.  velocity_of_position, rate_of_attitude:
+    these carry the stamps of the places, of the attitudes, and are as late.
     """
 
     name: str
@@ -51,6 +52,7 @@ class StageLog:
     rate_track: LogTrack | None = None
     follows_position: bool = False
     follows_reference: bool = False
+    velocity_of_reference: bool = False
     velocity_of_position: bool = False
     rate_of_attitude: bool = False
 

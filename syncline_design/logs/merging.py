@@ -42,6 +42,7 @@ class Merged:
     table: LogTable  # the file that sets the rows, with the columns of all
     tracks: Mapping[str, LogTrack]  # "PREFIXvelocity" or "PREFIXrate"
     follows_position: bool = False
+    velocity_of_reference: bool = False
 
 
 def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
@@ -83,7 +84,8 @@ def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
                 hint="are both files on the same time scale?",
             )
     table = replace(base, columns=columns, notes=tuple(notes))
-    return Merged(table, tracks, follows is not None)
+    theirs = _velocity_of_reference([base, *tables], prefixes[0])
+    return Merged(table, tracks, follows is not None, theirs)
 
 
 def _needs_velocity(tables: Sequence[LogTable], prefix: str) -> LogTable | None:
@@ -95,6 +97,13 @@ def _needs_velocity(tables: Sequence[LogTable], prefix: str) -> LogTable | None:
     if not holds or (reference and len(reference[0]) >= len(holds[0])):
         return None
     return holds[0]
+
+
+def _velocity_of_reference(tables: Sequence[LogTable], prefix: str) -> bool:
+    """Whether the velocity that is taken, the first, came with the better system's places."""
+    holds = [t for t in tables if prefix + VELOCITY[0] in t.columns]
+    theirs = (*REFERENCE, *(f"reference_{n}" for n in GEODETIC))
+    return bool(holds) and any(n in holds[0].columns for n in theirs)
 
 
 def _with_velocity(table: LogTable, prefix: str) -> LogTable:

@@ -50,6 +50,7 @@ class _Draft:
     tracks: Mapping[str, LogTrack]
     notes: list[str] = field(default_factory=list)
     follows_position: bool = False
+    velocity_of_reference: bool = False
 
     @property
     def path(self) -> Path:
@@ -120,6 +121,7 @@ def _draft(tables: Sequence[LogTable], prefixes: Sequence[str]) -> _Draft:
         joined.tracks,
         list(joined.table.notes),
         joined.follows_position,
+        joined.velocity_of_reference,
     )
 
 
@@ -245,6 +247,7 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: LogKind
         rate_track=draft.tracks.get(prefix + "rate"),
         follows_position=source == "position",
         follows_reference=source == "reference",
+        velocity_of_reference=first and draft.velocity_of_reference,
     )
 
 
