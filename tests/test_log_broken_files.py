@@ -114,7 +114,7 @@ CASES: dict[str, tuple[bytes | Callable[[Path], Path], int | str]] = {
     "trajectory/euroc-cut.csv": (EUROC[:-9], 39),
     "trajectory/nul.txt": (TUM[:600] + b"\0" + TUM[600:], 39),
     "sbet/cut.out": (SBET[:-1], 39),
-    "sbet/beyond-the-pole.out": (SBET[: 136 * 30] + b"\xff" * 136 + SBET[136 * 31 :], 30),
+    "sbet/beyond-the-pole.out": (SBET[: 136 * 30] + b"\xff" * 136 + SBET[136 * 31 :], 39),
     "sbet/zeros.out": (bytes(136 * 40), "no log that can be read"),
     "las/cut.las": (lambda f: _cut(las(f), 20), 39),
     "las/header-cut.las": (lambda f: _cut_to(las(f), 200), "header is cut"),

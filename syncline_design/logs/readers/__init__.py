@@ -14,6 +14,7 @@ from syncline_design.logs.readers.reader import FileHead, Reader, head_of
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
 
+WIDE = (b"\xff\xfe", b"\xfe\xff")  # byte order marks of UTF-16, which spreadsheets write
 NOT_READERS = frozenset({"reader", "stream"})
 
 
@@ -45,6 +46,12 @@ def open_recording(path: Path) -> Recording:
             "no log that can be read",
             expected="one of: " + ", ".join(sorted(r.format for r in registry().values())),
             found="a folder" if head.folder else repr(head.start[:16]),
-            hint="is it compressed, or of another kind?",
+            hint=_hint(head),
         )
     return reader.open(path)
+
+
+def _hint(head: FileHead) -> str:
+    if head.start.startswith(WIDE):
+        return "the text is UTF-16: write it as UTF-8 (iconv -f UTF-16 -t UTF-8)"
+    return "is it compressed, or of another kind?"

@@ -22,9 +22,10 @@ from syncline_design.logs.readers.ros_types import BagChannel, Encoding, modern
 MAGIC = b"\x89MCAP0\r\n"
 FORMAT = "MCAP file"
 MOST_RECORD = 1 << 28
-MESSAGE, CHUNK = 5, 6  # the kind of record
+FOOTER, MESSAGE, CHUNK = 2, 5, 6  # the kind of record
 DEFINING = (3, 4)  # schemas and channels, which stand among the messages of a chunk
 _RECORD = struct.Struct("<BQ")  # kind, length
+_FOOTER = struct.Struct("<QQI")  # where the index and its offsets begin, checksum
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _CHUNK = struct.Struct(
     "<QQQII"
@@ -53,13 +54,16 @@ class McapFile(Container):
         self._stream: Any = library("mcap.stream_reader", self.path, FORMAT)
         self._schemas: dict[int, tuple[str, str, str]] = {}
         self._channels: dict[int, BagChannel] = {}
+        self._chunks: list[int] | None = None
         budget = UnpackBudget(self.path, self._size)
         ended = False
         with self.path.open("rb") as file:
             try:
-                for record in self._of(file, whole=True):
+                for record in self._outer(file):
                     if isinstance(record, self._records.Chunk):
-                        yield from self._of_chunk(self._unpacked(record, budget))
+                        yield from self._sound(self._of_packed(record, budget))
+                        if self.lost.chunks:
+                            self._indexed(file)
                     elif isinstance(record, self._records.DataEnd):
                         ended = True
                         break
@@ -75,6 +79,48 @@ class McapFile(Container):
             raise DamagedError("cut off behind its data; no message is missing")
         if not ended:
             raise DamagedError("the file was not closed: its data have no end")
+
+    def _outer(self, file: Any) -> Iterator[Any]:
+        """The records of the file; behind one that is none, those from the next chunk on."""
+        at, begins = 0, True
+        while True:
+            try:
+                for record in self._of(file, whole=True, magic=begins):
+                    at = file.tell()
+                    yield record
+                return
+            except DamagedError as damage:
+                later = [one for one in self._indexed(file) if one > at]
+                if not later:
+                    raise
+                self.lost.add(damage)
+                begins, at = False, min(later)
+                file.seek(at)
+
+    def _indexed(self, file: Any) -> list[int]:
+        """Where chunks begin, by the file's index, whose channels count where theirs were lost."""
+        if self._chunks is not None:
+            return self._chunks
+        self._chunks, known, here = [], dict(self._channels), file.tell()
+        try:
+            file.seek(max(self._size - len(MAGIC) - _RECORD.size - _FOOTER.size, 0))
+            kind, _ = _RECORD.unpack(file.read(_RECORD.size))
+            begins = _FOOTER.unpack(file.read(_FOOTER.size))[0] if kind == FOOTER else 0
+            if begins:
+                file.seek(begins)
+                for record in self._of(file, whole=False):
+                    if isinstance(record, self._records.ChunkIndex):
+                        self._chunks.append(int(record.chunk_start_offset))
+                    elif isinstance(record, (self._records.Schema, self._records.Channel)):
+                        list(self._one(record))
+        except (DamagedError, struct.error, OSError):
+            self._chunks = []
+        self._channels |= known  # as they were: a topic is known by its channel
+        file.seek(here)
+        return self._chunks
+
+    def _of_packed(self, chunk: Any, budget: UnpackBudget) -> Iterator[RawMessage]:
+        yield from self._of_chunk(self._unpacked(chunk, budget))
 
     def _of_cut(self, file: Any, budget: UnpackBudget) -> Iterator[RawMessage]:
         """What the beginning of a chunk holds that ends with the file; no checksum covers it."""
@@ -123,15 +169,18 @@ class McapFile(Container):
             number, _, log_ns, publish_ns = _MESSAGE.unpack_from(data, body)
             channel = self._channels.get(number)
             if channel is None:
-                raise DamagedError("a message of no known channel")
+                if not self.lost.chunks:
+                    raise DamagedError("a message of no known channel")
+                self.lost.orphans += 1
+                continue
             if self.wanted is None or channel.topic in self.wanted:
                 yield RawMessage(channel, log_ns, publish_ns, data[body + _MESSAGE.size : at])
 
-    def _of(self, file: Any, whole: bool) -> Iterator[Any]:
-        """The records of a file, or some of a chunk, which have no magic and simply end."""
+    def _of(self, file: Any, whole: bool, magic: bool = False) -> Iterator[Any]:
+        """The records of a file, which has an end of its own, or some of a part, which has none."""
         exceptions = library("mcap.exceptions", self.path, FORMAT)
         reader = self._stream.StreamReader(
-            file, skip_magic=not whole, emit_chunks=True, record_size_limit=MOST_RECORD
+            file, skip_magic=not magic, emit_chunks=True, record_size_limit=MOST_RECORD
         )
         try:
             yield from reader.records

@@ -43,28 +43,68 @@ class Ros1Bag(Container):
 
     def _read(self) -> Iterator[RawMessage]:
         self._channels: dict[int, BagChannel] = {}
+        self._chunks: list[int] | None = None
         budget = UnpackBudget(self.path, self._size)
         with self.path.open("rb") as file:
             file.seek(len(MAGIC))
             index = self._index_of(file)
-            while file.tell() < (index or self._size):
-                fields, length = _record_head(file)
-                operation = _operation(fields)
-                if length > MOST_RECORD and length <= self._size - file.tell():
-                    most = f"at most {MOST_RECORD} bytes"
-                    raise refuse(self.path, "absurd length", expected=most, found=str(length))
-                if operation == CHUNK:
-                    data = file.read(min(length, MOST_RECORD))
-                    cut = len(data) < length  # what is there of a cut chunk is read
-                    yield from self._of_chunk(_unpacked(data, fields, budget, self.path, cut))
-                    if cut:
-                        raise DamagedError("cut off within a chunk")
-                elif operation in (MESSAGE, CONNECTION):
-                    yield from self._one(operation, fields, _taken(file, length))
-                else:
-                    _skip(file, length, self._size)
+            while (at := file.tell()) < (index or self._size):
+                try:
+                    yield from self._record(file, budget)
+                except DamagedError as damage:
+                    later = [one for one in self._indexed(file, index) if one > at]
+                    if not later:
+                        raise
+                    self.lost.add(damage)
+                    file.seek(min(later))
+                if self.lost.chunks:
+                    self._indexed(file, index)
         if not index:
             raise DamagedError("the bag was not closed: it has no index")
+
+    def _record(self, file: BinaryIO, budget: UnpackBudget) -> Iterator[RawMessage]:
+        """The messages of one record of the file."""
+        fields, length = _record_head(file)
+        operation = _operation(fields)
+        if length > MOST_RECORD and length <= self._size - file.tell():
+            most = f"at most {MOST_RECORD} bytes"
+            raise refuse(self.path, "absurd length", expected=most, found=str(length))
+        if operation == CHUNK:
+            data = file.read(min(length, MOST_RECORD))
+            cut = len(data) < length  # what is there of a cut chunk is read
+            found = self._of_packed(data, fields, budget, cut)
+            yield from found if cut else self._sound(found)
+            if cut:
+                raise DamagedError("cut off within a chunk")
+        elif operation in (MESSAGE, CONNECTION):
+            yield from self._one(operation, fields, _taken(file, length))
+        else:
+            _skip(file, length, self._size)
+
+    def _of_packed(
+        self, data: bytes, fields: Fields, budget: UnpackBudget, cut: bool
+    ) -> Iterator[RawMessage]:
+        yield from self._of_chunk(_unpacked(data, fields, budget, self.path, cut))
+
+    def _indexed(self, file: BinaryIO, index: int) -> list[int]:
+        """Where chunks begin by the bag's index, whose connections count where theirs were lost."""
+        if self._chunks is not None:
+            return self._chunks
+        self._chunks, known, here = [], dict(self._channels), file.tell()
+        try:
+            file.seek(index or self._size)
+            while file.tell() < self._size:
+                fields, length = _record_head(file)
+                data = _taken(file, length)
+                if _operation(fields) == CONNECTION:
+                    list(self._one(CONNECTION, fields, data))
+                elif len(at := fields.get(b"chunk_pos", b"")) == 8:
+                    self._chunks.append(struct.unpack("<Q", at)[0])
+        except DamagedError:
+            pass  # what the index tells up to its own damage
+        self._channels |= known  # as they were: a topic is known by its channel
+        file.seek(here)
+        return self._chunks
 
     def _index_of(self, file: BinaryIO) -> int:
         """Where the index begins, which is where messages end; 0 in a bag that was not closed."""
@@ -116,6 +156,9 @@ class Ros1Bag(Container):
             self._channels[connection] = _channel(fields, data)
             return
         time = fields.get(b"time", b"")
+        if len(time) == 8 and connection not in self._channels and self.lost.chunks:
+            self.lost.orphans += 1
+            return
         if connection not in self._channels or len(time) != 8:
             raise DamagedError("a message of no known connection")
         seconds, rest = _TIME.unpack(time)

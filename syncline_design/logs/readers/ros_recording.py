@@ -80,6 +80,34 @@ class UnpackBudget:
             raise refuse(self._path, "unpacks to too much", expected=limit, found=found)
 
 
+@dataclass(slots=True)
+class Lost:
+    """What one pass left out between good messages: chunks, and messages of channels that are gone.
+
+    first: what is wrong with the first of the chunks.
+    """
+
+    chunks: int = 0
+    first: str = ""
+    orphans: int = 0
+
+    def add(self, damage: DamagedError) -> None:
+        """Count one more damaged chunk."""
+        self.chunks += 1
+        self.first = self.first or str(damage)
+
+    def said(self) -> str:
+        """For people; empty where nothing was lost."""
+        parts = []
+        if self.chunks == 1:
+            parts.append(f"1 damaged chunk was left out: {self.first}")
+        elif self.chunks:
+            parts.append(f"{self.chunks} damaged chunks were left out, the first: {self.first}")
+        if self.orphans:
+            parts.append(f"{self.orphans} messages of channels that stood in damaged chunks")
+        return "; ".join(parts)
+
+
 class Container(ABC):
     """A file of raw messages, read from front to back."""
 
@@ -88,11 +116,19 @@ class Container(ABC):
         self.incomplete: Incomplete | None = None
         self.cut = ""  # what is known of a cut before reading comes to it
         self.wanted: frozenset[str] | None = None  # the topics that are read; None: all
+        self.lost = Lost()
         self.brief = False  # whether beginnings do of large messages, behind the first of a topic
 
     @abstractmethod
     def _read(self) -> Iterator[RawMessage]:
         """Every message in the order of the file; DamagedError where that ends early."""
+
+    def _sound(self, found: Iterator[RawMessage]) -> Iterator[RawMessage]:
+        """The messages of one chunk: damage costs what follows in it, and no other chunk."""
+        try:
+            yield from found
+        except DamagedError as damage:
+            self.lost.add(damage)
 
     def of_topics(self, topics: frozenset[str]) -> Iterator[RawMessage]:
         """The messages of some topics, and maybe of others, up to the last good one."""
@@ -114,17 +150,18 @@ class Container(ABC):
         """Every message up to the last good one; then `incomplete` is known."""
         deadline = in_force()
         count = 0
-        self.incomplete, self.cut = None, ""
+        self.incomplete, self.cut, self.lost = None, "", Lost()
+        reason = ""
         try:
             for count, message in enumerate(self._read(), 1):
                 if not count % CHECK_EVERY:
                     deadline.check()
                 yield message
         except DamagedError as damage:
-            self.incomplete = Incomplete(self.cut or str(damage), count)
-        else:
-            if self.cut:
-                self.incomplete = Incomplete(self.cut, count)
+            reason = str(damage)
+        said = [one for one in (self.cut or reason, self.lost.said()) if one]
+        if said:
+            self.incomplete = Incomplete("; ".join(said), count)
         if not count and self.incomplete is not None and self.wanted is None:
             raise refuse(
                 self.path,

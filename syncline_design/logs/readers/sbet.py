@@ -25,6 +25,7 @@ from syncline_design.logs.readers.epochs import WEEK_S, WEEK_SECONDS, nanosecond
 from syncline_design.logs.readers.reader import BY_SHAPE, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
 SBET = (
@@ -37,6 +38,7 @@ SMRMSG = (
 )
 PIECE = 20_000  # records
 LATEST_S = 2.0 * WEEK_S  # seconds may run on past the end of the week
+LONGEST_S = 3600.0  # after which records behind damage count as of the same trajectory
 LOOKED_AT = 64  # records at the beginning, by which a file is told
 PI = np.pi
 MOST = np.array(
@@ -49,11 +51,70 @@ def possible(rows: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which records can be any: the format has no checksum, damage shows as what cannot be."""
     most = MOST if rows.shape[1] == len(SBET) else MOST_ERROR
     good = np.all(np.isfinite(rows), axis=1) & np.all(np.abs(rows) <= most, axis=1)
-    good &= rows[:, 0] >= 0
+    good &= (rows[:, 0] >= 0) & np.any(rows != 0, axis=1)
     if rows.shape[1] == len(SMRMSG):
         good &= np.all(rows[:, 1:] >= 0, axis=1)
     kept: NDArray[np.bool_] = good
     return kept
+
+
+@dataclass(slots=True)
+class _Damage:
+    """Records that one pass left out, the first of them, and what is wrong behind the last.
+
+    time_s: of the last good record; behind: whether the record before was left out.
+    """
+
+    count: int = 0
+    first: int = 0
+    first_time_s: float = 0.0
+    time_s: float | None = None
+    behind: bool = False
+    cut: str = ""
+
+    def kept(self, table: NDArray[np.float64], before: int) -> NDArray[np.float64]:
+        """The good records of a table, `before` others in front of it.
+
+        Behind damage a stretch counts only where its time goes on from that of the last good one:
+        lost bytes shift what follows, which then is no record although its figures may be possible.
+        """
+        good = possible(table)
+        if np.all(good) and not self.behind:
+            self.time_s = float(table[-1, 0])
+            return table
+        edges = np.flatnonzero(np.diff(good)) + 1
+        for rows in np.split(np.arange(table.shape[0]), edges):
+            times = table[rows, 0]
+            if good[rows[0]] and self.behind:
+                good[rows[: self._astray(times)]] = False
+            self.behind = not good[rows[-1]]
+            if not self.behind:
+                self.time_s = float(times[-1])
+        if lost := int(np.count_nonzero(~good)):
+            at = int(np.argmin(good))
+            if not self.count:
+                self.first, self.first_time_s = before + at + 1, float(table[at, 0])
+            self.count += lost
+        return table[good]
+
+    def _astray(self, times: NDArray[np.float64]) -> int:
+        """How many records come before one that follows the last good one, also in a new week."""
+        if self.time_s is None:
+            return times.size
+        follows = (times - self.time_s) % WEEK_S < LONGEST_S
+        return int(np.argmax(follows)) if np.any(follows) else times.size
+
+    def said(self) -> str:
+        """For people; empty where every record was read."""
+        parts = []
+        if self.count:
+            time = f"(time {to_digits(self.first_time_s, 6)} s)"
+            parts.append(
+                f"record {self.first} cannot be one {time}"
+                if self.count == 1
+                else f"{self.count} records cannot be any, the first record {self.first} {time}"
+            )
+        return "; ".join([*parts, *([self.cut] if self.cut else [])])
 
 
 class SbetRecording(BatchRecording):
@@ -69,7 +130,8 @@ class SbetRecording(BatchRecording):
     def _batches(self, wanted: str | None) -> Iterator[Batch]:
         rows, last = 0, 0.0
         past = wraps = 0
-        for table in self._tables(rows):
+        damage = _Damage()
+        for table in self._tables(damage):
             count = table.shape[0]
             times = np.concatenate([[last if rows else table[0, 0]], table[:, 0]])
             wraps += int(np.count_nonzero(np.diff(times) < -WEEK_S / 2))
@@ -78,29 +140,23 @@ class SbetRecording(BatchRecording):
             columns = _columns(table) if table.shape[1] == len(SBET) else _errors(table)
             yield Batch(self.path.stem, count, nanoseconds_of(table[:, 0]), None, columns)
         self._past_week, self._wraps = past, wraps
+        if said := damage.said():
+            self._cut(said, rows)
 
-    def _tables(self, rows: int) -> Iterator[NDArray[np.float64]]:
-        """Whole and possible records; notes where they end before the file does."""
-        size = 8 * self._width
+    def _tables(self, damage: _Damage) -> Iterator[NDArray[np.float64]]:
+        """Whole and possible records; notes which are none."""
+        size, before = 8 * self._width, 0
         with self.path.open("rb") as file:
             while raw := file.read(PIECE * size):
                 whole = len(raw) // size * size
                 table = np.frombuffer(raw[:whole], dtype="<f8").reshape(-1, self._width)
-                good = possible(table)
-                end = table.shape[0] if np.all(good) else int(np.argmin(good))
-                rows += end
-                if end:
-                    yield table[:end].astype(float)
-                if end < table.shape[0]:
-                    time = float(table[end, 0])
-                    self._cut(
-                        f"record {rows + 1} cannot be one (time {to_digits(time, 6)} s)", rows
-                    )
-                    return
+                kept = damage.kept(table, before) if table.shape[0] else table
+                before += table.shape[0]
+                if kept.shape[0]:
+                    yield kept.astype(float)
                 if whole < len(raw):
                     left = len(raw) - whole
-                    self._cut(f"{left} bytes at the end are no whole record of {size}", rows)
-                    return
+                    damage.cut = f"{left} bytes at the end are no whole record of {size}"
 
     def _facts(self, name: str) -> StreamFacts:
         of_times: tuple[str, ...] = (
