@@ -191,3 +191,35 @@ def test_equal_stamps_of_a_grid_do_not_go_back_beside_a_drift(
     faults = named(of(stamp, np.maximum.accumulate(when + late)))
     assert set(faults) == {"truncated_stamps", "drift"}
     assert faults["drift"].parameters["ppm"] == pytest.approx(ppm, abs=5.0)
+
+
+@pytest.mark.parametrize("seed", [2, 3, 7])
+@pytest.mark.parametrize(("rate", "grid_s"), [
+    (11.0, 0.1), (12.5, 0.1), (13.0, 0.1), (15.0, 0.1), (17.0, 0.1), (1.1, 1.0), (1.25, 1.0),
+])  # fmt: skip
+def test_messages_that_share_a_coarse_grain_now_and_then_are_cut_off(
+    rate: float, grid_s: float, seed: int
+) -> None:
+    """Faster than the grid by less than twice: some share a grain, and come as far apart as all."""
+    rng = generator((40, seed, int(100 * rate)))
+    when = 0.7 * grid_s * rng.uniform() + np.arange(int(120.0 * rate)) / rate * (1.0 + 1e-5)
+    receive = np.maximum.accumulate(when + 5e-3 + rng.gamma(2.0, 0.02 * grid_s, when.size))
+    one = of(np.floor(when / grid_s) * grid_s, receive)
+    assert set(named(one)) == {"truncated_stamps"}
+    assert named(one)["truncated_stamps"].parameters["resolution_s"] == grid_s
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
+    assert one.residual.as_recorded is not None
+    assert one.residual.as_recorded > 0.9 * np.ptp(receive - np.floor(when / grid_s) * grid_s)
+
+
+@pytest.mark.parametrize("every", [5, 8, 13])
+@pytest.mark.parametrize("grid_s", [0.1, 1.0])
+def test_messages_sent_twice_in_a_beat_are_not_cut_off(grid_s: float, every: int) -> None:
+    """A sensor at exact epochs of which every so many are sent again at once: its receipts tell."""
+    rng = generator((41, every))
+    epochs = np.arange(int(120.0 / grid_s)) * grid_s
+    stamp = np.sort(np.concatenate([epochs, epochs[::every]]))
+    twice = np.concatenate([[0.0], np.diff(stamp)]) == 0.0
+    late = 5e-3 + rng.gamma(2.0, 0.02 * grid_s, epochs.size)
+    receive = late[np.cumsum(~twice) - 1] + stamp + 2e-3 * twice
+    assert set(named(of(stamp, receive))) == {"duplicates"}

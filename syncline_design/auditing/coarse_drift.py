@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.blocks import blocks_of
 from syncline_design.auditing.clock_shapes import Shape, course
-from syncline_design.auditing.coarse_rhythm import best_period, counted_behind
+from syncline_design.auditing.coarse_rhythm import counted_behind, periods_within
 from syncline_design.auditing.levels import believed, polished
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import FaultName, StampFault
@@ -24,9 +24,7 @@ from syncline_design.auditing.series import NS, Array, Series, seconds
 from syncline_design.auditing.witness import straight
 from syncline_design.logs.readers.stream import Nanoseconds
 
-_MOST_WAITED: Final = 1.1  # ticks
-_WINDOW: Final = 400  # messages, over which a rhythm is hardly off
-_MOST_APART: Final = 2.0  # times what neighbouring waits are apart
+_MOST_WAITED: Final = 1.1  # ticks, with a message or two that were counted elsewhere
 
 
 def drift_behind(
@@ -63,13 +61,13 @@ def _late(series: Series, names: Set[FaultName], tick_s: float) -> tuple[Array |
     if count is None:
         return None, 0.0
     when = seconds(series.stamp[places] - series.stamp[places[0]])
-    waits = when - best_period(when, count.number) * count.number
+    period = 0.5 * sum(periods_within(when, count.number, tick_s))
+    waits = when - period * count.number
     if float(np.ptp(waits)) > _MOST_WAITED * tick_s:
         return None, 0.0  # miscounted
-    # of an interval that is nearly a simple part of the tick few waits are met, and any rhythm
-    # fits that keeps them apart
-    apart = np.diff(np.sort(waits[:_WINDOW]))
-    unsure = _MOST_APART * max(float(apart.max()), tick_s - float(np.ptp(waits)))
+    # where an interval is nearly a simple part of the tick few waits are met, and many rhythms fit
+    low, high = periods_within(when, count.number, _MOST_WAITED * tick_s)
+    unsure = 0.5 * (high - low) * float(np.ptp(count.number))
     return np.asarray(late + waits - np.median(late + waits)), unsure
 
 

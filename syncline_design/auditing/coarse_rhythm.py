@@ -160,6 +160,28 @@ def best_period(when: Array, number: Array) -> float:
     return 0.5 * (low + high)
 
 
+def periods_within(when: Array, number: Array, longest_s: float) -> tuple[float, float]:
+    """The shortest and the longest interval [s] with which waits are no further apart than that.
+
+    Where few places of a tick are met the stamps are the same for all of them.  The reach of waits
+    is convex in the interval: both ends are found by halving.
+    """
+    best = best_period(when, number)
+    level = max(longest_s, _reach(when, number, best))
+    steps = float(number[-1] - number[0])
+    ends = []
+    for side in (-1.0, 1.0):
+        inside, outside = best, best + 2.0 * side * level / steps
+        for _ in range(_SEARCH):
+            middle = 0.5 * (inside + outside)
+            if _reach(when, number, middle) <= level:
+                inside = middle
+            else:
+                outside = middle
+        ends.append(inside)
+    return ends[0], ends[1]
+
+
 def _by_floors(when: Array, tick_s: float) -> Counted | None:
     """Messages counted by the least waits of some at a time."""
     if when.size < _LEAST * _FLOORS or when[-1] <= when[0]:

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.auditing.alternations import FINE, alternates, skips_evenly
 from syncline_design.auditing.cadence import Cadence, about_rhythm
-from syncline_design.auditing.coarse_rhythm import evenly
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
 from syncline_design.auditing.ticks import tick_of
@@ -23,11 +23,9 @@ ROUNDING_NS: Final = 600  # of a file that keeps microseconds, or doubles of Uni
 _ON_GRID: Final = 0.995  # of all times
 TIMERS: Final = (0.016, 0.008, 0.004, 0.005, 0.01, 0.02, 0.0125, 0.025, 0.032, 0.04, 0.05, 0.1)
 FTDI_S: Final = 0.016
-_FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _MOST_MOMENTS: Final = 200_000
 _ALONE: Final = 1.15  # ticks between messages, from which on no two of them share one
 _FAR: Final = 5.0  # ticks: what is longer is a gap or a jump
-_LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
 _REACH: Final = 0.6  # of a grain, by receipts
 _MOST_OF: Final = 0.9  # of what receipts of one grain lie apart
 _HALF: Final = 0.02  # how near to two messages a grain their number is
@@ -37,14 +35,7 @@ _DISORDER: Final = 0.02  # of all stamps: transport that changes their order
 _COHERENT: Final = 0.75
 _EXACT: Final = 0.002  # of a tick
 _EVEN: Final = 0.1  # of what neighbours are uneven by
-_LEAST_TURNS: Final = 2  # grains left out, to know that they are
-_TURN: Final = 1.3  # grains that such a course may begin or end with
-_STRAIGHT: Final = 0.4  # of a grain: delays about the course
-_BACK: Final = 0.35  # of a grain
-_NEXT: Final = 8  # messages on each side
-_MOST_LOST: Final = 0.15  # of all messages
 _COARSE_STEPS: Final = 3.0
-_OF_TWO: Final = 0.96  # of the intervals: one tick or two; among others messages may be lost
 _BUNCHED: Final = 0.25  # share of neighbours that come together
 _QUICK_READ_S, _SLOW_READ_S = 4e-4, 2e-3  # that a host takes to read a message of a packet
 _EVENLY: Final = 0.2  # of what they are apart
@@ -82,7 +73,7 @@ def truncated(
     if stamp.size < 20:
         return None
     grain = grain_of(stamp if told is None else told[pace.places])
-    if grain <= file_step_ns or not _alternates(series, pace, grain) or _ticks(stamp, grain):
+    if grain <= file_step_ns or not alternates(series, pace, grain) or _ticks(stamp, grain):
         return None
     if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
         return None
@@ -114,88 +105,16 @@ def _in_bunches(series: Series, pace: Cadence, grain: int) -> bool:
     if float(np.mean(same)) < 0.2:
         return False
     if series.receive is None:
-        return grain > _FINE
+        return grain > FINE
     passed = np.diff(series.receive[pace.places])
     together = float(np.median(passed[same])) < 0.3 * float(passed.mean())
-    return together and (grain > _FINE or float(np.median(passed[~same])) > 0.5 * grain)
+    return together and (grain > FINE or float(np.median(passed[~same])) > 0.5 * grain)
 
 
 def _ticks(stamp: np.ndarray, grain: int) -> bool:
     """Whether stamps on a grid are in truth ticks of a slower timer, such as 16 ms."""
     timers = [round(t * NS) for t in TIMERS if round(t * NS) not in GRAINS]
     return any(t > grain and not np.any((stamp - stamp[0]) % t) for t in timers)
-
-
-def _alternates(series: Series, pace: Cadence, grain: int) -> bool:
-    """Whether intervals of neighbours lie on both sides of a rhythm that is not the grid's."""
-    counts = np.round(np.diff(series.stamp[pace.places]) / grain)
-    counts = counts[np.diff(pace.places) == 1]  # over messages that were left out none is odd
-    if np.count_nonzero(counts) < _LEAST_STEPS:
-        return False
-    values, often = np.unique(counts, return_counts=True)
-    usual = values[int(np.argmax(often))]
-    if usual == 0:
-        return True
-    near = (np.abs(counts - usual) <= 1) & (counts != usual)
-    if usual == 1:  # of 0 and 2 grains beside 1: duplicates and losses, unless they come evenly
-        slower = skips_evenly(counts) and not _lost(series, pace, counts, grain)
-        slower = slower or _sawtooth(series, pace, counts, grain)
-        return slower or (grain <= _FINE and evenly(np.flatnonzero(counts == 0)))
-    return int(np.sum(near & (counts % usual != 0))) >= 3
-
-
-def _sawtooth(series: Series, pace: Cadence, counts: Array, grain: int) -> bool:
-    """Whether receipts run away from stamps evenly and come back by a grain where one is left out.
-
-    So does a sensor whose interval is nearly the grain, however seldom its stamps leave one out.
-    """
-    if series.receive is None or counts.size != pace.places.size - 1:
-        return False
-    extra = np.concatenate([[0.0], np.cumsum(counts - 1.0)])
-    turns = abs(float(extra[-1]))
-    skips = np.flatnonzero(counts != 1.0)
-    if not _LEAST_TURNS <= skips.size == turns:
-        return False
-    late = (series.receive - series.stamp)[pace.places].astype(np.float64)
-    whole = late - late[0] + grain * extra
-    when = series.seconds[pace.places]
-    slope, first = np.polynomial.polynomial.polyfit(when, whole, 1)[::-1]
-    left = whole - first - slope * when
-    ramp = abs(slope) * float(when[-1] - when[0]) / grain
-    sides = [(late[max(0, k - _NEXT) : k + 1], late[k + 1 : k + 2 + _NEXT]) for k in skips]
-    back = [float(np.median(before) - np.median(after)) for before, after in sides]
-    sizes = np.abs(np.asarray(back)) / grain
-    return (
-        abs(ramp - turns) < _TURN
-        and spread(left) < _STRAIGHT * grain
-        and abs(float(np.median(sizes)) - 1.0) < _BACK
-    )
-
-
-def _lost(series: Series, pace: Cadence, counts: Array, grain: int) -> bool:
-    """Whether ticks are left out because messages are missing, not because the sensor is slower.
-
-    The stamps of a slower sensor lie ever further before its receipts until a tick is left out;
-    where messages are lost, those around the hole are as late as all others.
-    """
-    if series.receive is None or counts.size != pace.places.size - 1:
-        return False
-    late = (series.receive - series.stamp)[pace.places]
-    skips = np.flatnonzero(counts == 2)
-    skips = skips[(skips > 1) & (skips < counts.size - 2)]
-    if not skips.size or skips.size > _MOST_LOST * counts.size:
-        return False
-    before = np.minimum(late[skips], late[skips - 1])
-    after = np.minimum(late[skips + 1], late[skips + 2])
-    return abs(float(np.median(before - after))) < 0.4 * grain
-
-
-def skips_evenly(counts: Array) -> bool:
-    """Whether single ticks are left out at even distances: a beat, and no lost messages."""
-    skips = np.flatnonzero(counts == 2)
-    if skips.size < 6 or float(np.mean((counts == 1) | (counts == 2))) < _OF_TWO:
-        return False
-    return evenly(skips)
 
 
 def _strictly(counts: Array) -> bool:
@@ -219,7 +138,7 @@ def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
     fault = StampFault(
         "truncated_stamps", {"resolution_s": size}, None, None,
         f"every stamp is a multiple of {to_digits(size * 1e3, 6)} ms{name}, though messages are "
-        f"not",
+        f"not: up to that far off, which is in `as_recorded` alone",
         (twice,) if same else (),
     )  # fmt: skip
     return Grain(fault, size, same > 0)
