@@ -65,6 +65,9 @@ def test_banded_algebra_is_the_dense_one(m: int) -> None:
     assert known.solve(series) == pytest.approx(expected, abs=1e-10)
     many = np.tile(series, 25)  # solved side by side
     assert known.solve(many) == pytest.approx(np.tile(expected, 25), abs=1e-10)
+    told = series.reshape(45, 5).T @ expected.reshape(45, 5)
+    assert known.information(series) == pytest.approx(told, abs=1e-9)
+    assert known.information(many) == pytest.approx(np.tile(told, (25, 25)), abs=1e-9)
     error = series[:, :, 0]
     density = multivariate_normal(np.zeros(45), full).logpdf(error.ravel())
     assert known.negative_log_likelihood(error) == pytest.approx(-density, rel=1e-10)
@@ -85,6 +88,9 @@ def test_many_columns_are_solved_as_each_alone(repeated: bool) -> None:
     together = known.solve(series)
     alone = np.concatenate([known.solve(series[:, :, k : k + 5]) for k in range(0, 200, 5)], axis=2)
     assert np.all(np.abs(together - alone) < 1e-9 * np.max(np.abs(alone), axis=(0, 1)))
+    told = np.einsum("nij,nik->jk", series, alone)
+    scale = np.sqrt(np.diag(told))
+    assert np.all(np.abs(known.information(series) - told) < 1e-9 * scale[:, None] * scale)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7, 15])

@@ -11,12 +11,12 @@ import pytest
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import NoVerdict
 from syncline_design.planning import enough
-from syncline_design.planning.drives import World
+from syncline_design.planning.drives import MOST_ROWS, World, whole_information
 from syncline_design.planning.effort import Effort
 from syncline_design.planning.placing import LegTold
 from syncline_design.planning.run import plan as planned
 from syncline_design.planning.search import Others, PlanJudge
-from syncline_design.planning.setup import PlanRequest
+from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.standard import Lines, legs_needed, times_needed
 from syncline_design.planning.telling import PlanRun
 from syncline_design.planning.wanted import Goal, PlanWanted, reach_of
@@ -134,6 +134,22 @@ def test_what_another_effect_would_take_is_not_reached_yet() -> None:
     assert times_needed(judge, one) == pytest.approx(needed, rel=0.005)
     line = Lines("line", one[None], np.array([20.0]), np.array([0.0]))
     assert legs_needed(judge, line) == math.ceil(needed)
+
+
+def test_what_a_long_drive_tells_is_the_same_of_fewer_rows(tmp_path: Path) -> None:
+    """Of hours only `MOST_ROWS` rows are computed, here one every 1.2 s for one every 0.1 s; which
+    effects a log shows hangs on its rows a second, and what the figures stand for must not."""
+    request = PlanRequest(PlanWanted(reach_of(TIGHT)), line_plans=False)
+    setup = Setup.begun(load(spec_with(tmp_path, (", area: [250 m, 250 m]", ""))), request)
+    few = setup.world.coarse(4 * 3600.0)
+    assert few.computed_hz == pytest.approx(MOST_ROWS / (4 * 3600.0))
+    longest = sorted(setup.told, key=lambda one: one.leg.duration_s)[-6:]
+    told = np.sqrt(np.diag(whole_information(few, longest)))
+    fine = np.sqrt(np.diag(whole_information(setup.world, longest)))
+    seen = fine > 1e-6 * np.max(fine)
+    ratio = told[seen] / fine[seen]
+    assert np.median(np.abs(ratio - 1.0)) < 0.02
+    assert np.all((ratio > 0.7) & (ratio < 1.4))
 
 
 def test_a_search_ends_where_its_effort_does(tmp_path: Path) -> None:

@@ -41,6 +41,7 @@ def test_lasting_errors_are_those_of_the_dense_covariance() -> None:
     known = with_lasting(factored(white, loading, time_s, constants_s), survey)
     solved = np.linalg.solve(dense, error.ravel())
     assert np.allclose(known.solve(error[:, :, None])[:, :, 0].ravel(), solved, rtol=1e-9)
+    assert np.isclose(known.information(error[:, :, None])[0, 0], error.ravel() @ solved, rtol=1e-9)
     density = -multivariate_normal(np.zeros(3 * ROWS), dense).logpdf(error.ravel())
     assert np.isclose(known.negative_log_likelihood(error), density, rtol=1e-10)
     flat = survey.reshape(3 * ROWS, -1)

@@ -94,6 +94,20 @@ def with_lasting(known: Precision, loading: Array) -> Precision:
 
 
 @dataclass(frozen=True, slots=True)
+class _Halfway:
+    """P^-1 R solved forwards, in g groups of w states.
+
+    inverse (g, w, w) A_i; step (g, m, 1) D_i; left (g, w, c) what each group adds; states (g, w, c)
+    z_i.
+    """
+
+    inverse: Array
+    step: Array
+    left: Array
+    states: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Precision:
     """The factored covariance of one series."""
 
@@ -120,12 +134,35 @@ class Precision:
         inside: Array = self.loading @ self.states(weighted)
         return weighted - self.white_inverse @ inside
 
+    def information(self, series: Array) -> Array:
+        """Y' C^-1 Y, (c, c): half the work of `solve`, since P^-1 is half way a sum of squares."""
+        weighted: Array = self.white_inverse @ series
+        found = _summed(series, weighted)
+        if self.loading.shape[2]:
+            found -= self._explained(self._at_stamps(weighted))
+        if self.lasting is not None:
+            cross = _summed(self.lasting.weighted, series)
+            found -= cross.T @ self.lasting.inverse @ cross
+        return found
+
+    def _explained(self, right: Array) -> Array:
+        """R' P^-1 R of R (k, m, c), (c, c)."""
+        if right.shape[2] < _MANY:
+            flat = right.reshape(-1, right.shape[2])
+            solved: Array = cho_solve_banded((self.factor, True), flat, check_finite=False)
+            return _summed(right, solved.reshape(right.shape))
+        halfway = self._forwards(right)
+        return _summed(halfway.left, halfway.states)
+
+    def _at_stamps(self, weighted: Array) -> Array:
+        """B' Sigma^-1 Y summed over the rows of every stamp, (k, m, c)."""
+        right: Array = np.swapaxes(self.loading, 1, 2) @ weighted
+        return right if self.first is None else summed(self.first, right)
+
     def states(self, weighted: Array) -> Array:
         """P^-1 B' Sigma^-1 Y at every row, (n, m, c)."""
         m, c = self.loading.shape[2], weighted.shape[2]
-        right = np.swapaxes(self.loading, 1, 2) @ weighted
-        if self.first is not None:
-            right = summed(self.first, right)
+        right = self._at_stamps(weighted)
         if c < _MANY:
             found: Array = cho_solve_banded(
                 (self.factor, True), right.reshape(-1, c), check_finite=False
@@ -135,12 +172,12 @@ class Precision:
             states = self._side_by_side(right)
         return states if self.group is None else states[self.group]
 
-    def _side_by_side(self, right: Array) -> Array:
-        """P^-1 R of many columns, R (k, m, c): a few stamps at a time, all columns at once.
+    def _forwards(self, right: Array) -> _Halfway:
+        """Half of P^-1 R of many columns, R (k, m, c): a few stamps at a time, all columns at once.
 
         With A_i the inverse of L_ii L_ii', L_ii the factor's triangle of these stamps, and D_i the
-        block of P between the last of them and the next, forwards z_i = A_i (r_i - D_i-1 z_i-1),
-        backwards x_i = z_i - A_i D_i x_i+1.
+        block of P between the last of them and the next, left_i = r_i - D_i-1 z_i-1 and
+        z_i = A_i left_i, so that R' P^-1 R is the sum of left_i' z_i.
         """
         k, m, c = right.shape
         stamps = max(_WIDE // m, 1)
@@ -153,6 +190,14 @@ class Precision:
         for block, off, row, found in zip(inverse[1:], step, rows[1:], states[1:], strict=False):
             row[:m] -= off * before[-m:]
             before = np.matmul(block, row, out=found)
+        return _Halfway(inverse, step, rows, states)
+
+    def _side_by_side(self, right: Array) -> Array:
+        """P^-1 R of many columns, R (k, m, c): backwards x_i = z_i - A_i D_i x_i+1."""
+        k, m, c = right.shape
+        halfway = self._forwards(right)
+        inverse, step, states = halfway.inverse, halfway.step, halfway.states
+        before = states[-1]
         last = np.ascontiguousarray(inverse[:, :, -m:])
         for block, off, found in zip(last[-2::-1], step[::-1], states[-2::-1], strict=False):
             found -= block @ (off * before[:m])

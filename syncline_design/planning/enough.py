@@ -4,7 +4,8 @@ The search adds up what legs tell alone.  Turns between them tell more, joints a
 less, so that what it aims at (its margin) is not what the drive reaches: that is judged whole, and
 the margin is moved by how far it was off, until the drive is enough and hardly more.  How far it is
 off differs from drive to drive: of a single leg most of all.  So shorter drives that the search
-passed by, since their legs alone fall somewhat short, are judged whole as well.
+passed by, since their legs alone fall somewhat short, are judged whole as well, where they may
+prove enough and save time that matters.
 """
 
 from __future__ import annotations
@@ -13,8 +14,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import field
 from typing import Final
-
-import numpy as np
 
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -29,8 +28,9 @@ CLOSE: Final = 0.985  # of what is asked: from there on a drive tells hardly mor
 TRIED: Final = 5  # margins
 MOST_JUDGED: Final = 24  # drives that are judged whole
 ALIKE: Final = 0.003  # by which two margins differ that are as good as one
-PASSED_BY: Final = 3.0  # times off what is asked, by its legs alone, that a drive may prove enough
-MOST_PASSED_BY: Final = 24  # of these that are judged whole
+BY_TURNS: Final = 0.6  # of what one leg falls short by alone that the turns beside it may make up
+MOST_PASSED_BY: Final = 24  # drives passed by that are judged whole
+SAVES: Final = 0.95  # of a drive's time: one that takes more saves nothing that matters
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +71,13 @@ def _passed_by(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[
 
     A search of limited effort leaves them where it has spent half of it.
     """
-    left = MOST_PASSED_BY
-    for legs in search.looked_at(lambda one: float(np.max(one.every, initial=0.0)), PASSED_BY):
+    left, usual = MOST_PASSED_BY, whole.worst(enough) / search.standing_of(enough).furthest
+    for alone, legs in search.looked_at(lambda one: one.furthest, 1.0 / (usual * (1.0 - BY_TURNS))):
         if not left or search.deadline.is_over or search.effort.is_half_over:
             break
-        if lasting_s(legs) < lasting_s(enough) - 1e-6 and search.fits(legs):
+        if alone * usual * (1.0 - BY_TURNS / len(legs)) > 1.0:
+            continue
+        if lasting_s(legs) < SAVES * lasting_s(enough) and search.fits(legs):
             left -= 1
             enough = legs if whole.worst(legs) <= 1.0 else enough
     return enough

@@ -17,7 +17,6 @@ import numpy as np
 
 from syncline_design.diagnosis import candidates as effects_of
 from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.fitting import inner
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
     Structure,
@@ -82,8 +81,7 @@ def drift_columns(view: Scene, wanted: Sequence[Unknown], first: Array) -> Array
 
 def fisher(structure: Structure, level: NoiseLevel, slopes: Array) -> Array:
     """X' C^-1 X, (p, p)."""
-    weighted = precision(structure, level).solve(slopes)
-    found = inner(slopes, weighted)
+    found = precision(structure, level).information(slopes)
     return 0.5 * (found + found.T)
 
 

@@ -173,6 +173,10 @@ class Standing:
     every: Array
     taken: float
 
+    @property
+    def furthest(self) -> float:
+        return float(np.max(self.every, initial=0.0))
+
     def loss(self, margin: float) -> float:
         """Sum of the logarithms of what is not reached, the worst twice; 0 where all is reached."""
         logs = np.log(np.maximum(self.every / margin, 1.0))
@@ -260,18 +264,20 @@ class LegSearch:
             self.effort.spent += 1
         return found
 
+    def standing_of(self, sequence: Sequence[LegTold]) -> Standing:
+        return self.standing(self.key(sequence), lambda: together(sequence))
+
     def value(self, sequence: Sequence[LegTold]) -> tuple[float, float]:
-        found = self.standing(self.key(sequence), lambda: together(sequence))
-        return found.value(self.margin)
+        return self.standing_of(sequence).value(self.margin)
 
     def looked_at(
-        self, worth: Callable[[Standing], float], most: float = math.inf
-    ) -> Iterator[list[LegTold]]:
+        self, worth: Callable[[Standing], float], most: float
+    ) -> Iterator[tuple[float, list[LegTold]]]:
         """What the search has looked at so far and is worth at most so much, the least first."""
         by_id = {id(told): told for told in self.legs}
         sized = ((worth(one), key) for key, one in self.known.items() if key)
-        for _, key in sorted((one for one in sized if one[0] <= most), key=lambda one: one[0]):
-            yield [by_id[k] for k in key]
+        for size, key in sorted((one for one in sized if one[0] <= most), key=lambda one: one[0]):
+            yield size, [by_id[k] for k in key]
 
     def reaches(self, sequence: Sequence[LegTold]) -> bool:
         return bool(sequence) and self.value(sequence)[0] <= 0.0
@@ -370,7 +376,7 @@ def best_within(search: LegSearch, most_s: float) -> list[LegTold]:
     plan = search.bettered(plan, most_s)
     worth = search.value(plan)[1]
     seen = search.looked_at(lambda one: one.value(search.margin)[1], worth)
-    within = (legs for legs in seen if lasting_s(legs) <= most_s and search.fits(legs))
+    within = (legs for _, legs in seen if lasting_s(legs) <= most_s and search.fits(legs))
     return next(within, plan)
 
 
