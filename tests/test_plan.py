@@ -108,6 +108,29 @@ def test_what_is_asked_is_reached_leg_by_leg(run: PlanRun) -> None:
         assert before.to_s == after.from_s
 
 
+def test_the_words_are_the_drive(run: PlanRun, pair: PlanRun) -> None:
+    """Every turn of the path before a leg is said, and no other: headings by the path alone."""
+    for one in (run, pair):
+        yaw = np.degrees(one.path.euler_rad[:, 2])
+        leg = np.array(one.leg)
+        assert one.result.legs[0].turn_deg == 0.0
+        assert not one.result.legs[0].words.startswith("Turn ")
+        for k, told in enumerate(one.result.legs):
+            assert math.remainder(yaw[leg == k][-1] - yaw[leg == k][0], 90.0) == pytest.approx(
+                0.0, abs=2.0
+            )
+            if k == 0:
+                assert told.heading_deg == pytest.approx(yaw[0], abs=1e-6)
+                continue
+            before = yaw[leg == k - 1][-1]
+            assert math.remainder(before + told.turn_deg - told.heading_deg, 360.0) == (
+                pytest.approx(0.0, abs=2.0)
+            )
+            side = "right" if told.turn_deg > 0.0 else "left"
+            said = f"Turn {side} by {abs(told.turn_deg):.0f} deg on the spot, then "
+            assert told.words.startswith(said) == (abs(told.turn_deg) > 1.0)
+
+
 SURVEYED = (
     (512.0, 181.0, -2.9),
     (489.5, 222.25, -3.4),

@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import syncline_design as sd
 from syncline_design.planning.drives import outcome
-from syncline_design.planning.legs import library
-from syncline_design.planning.path import travelled
+from syncline_design.planning.legs import library, transition
+from syncline_design.planning.path import STEP_S, joined, travelled
 from syncline_design.planning.run import plan as planned
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.telling import PlanRun, Telling
@@ -224,3 +225,40 @@ def test_a_height_over_nothing_that_is_ranged_to_is_kept(tmp_path: Path) -> None
     assert done.exit_code == 0, done.output
     with waypoints.open(encoding="utf-8", newline="") as stream:
         assert float(next(csv.DictReader(stream))["down_m"]) == pytest.approx(-60.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("motion", "v_max_mps", "omega_max"),
+    [
+        ("fixed_wing", 70.0, 5.0),
+        ("fixed_wing", 250.0, 3.0),
+        ("fixed_wing", 20.0, 40.0),
+        ("multirotor", 8.0, 15.0),
+        ("multirotor", 15.0, 60.0),
+        ("ground", 40.0, 3.0),
+        ("surface", 4.0, 3.0),
+        ("underwater", 3.0, 2.0),
+    ],
+)
+def test_no_leg_turns_faster_than_the_platform_can(
+    tmp_path: Path, motion: str, v_max_mps: float, omega_max: float
+) -> None:
+    """The whole body rate, leaning into turns too: differences of the attitude by quaternions."""
+    spec = spec_with(
+        tmp_path,
+        ("motion: multirotor", f"motion: {motion}"),
+        (
+            "v_max: 9 m/s, omega_max: 50 deg/s",
+            f"v_max: {v_max_mps} m/s, omega_max: {omega_max} deg/s",
+        ),
+        (", area: [250 m, 250 m]", ""),
+        ("acceleration: 2 m/s^2", "distance: 300 m"),
+        ("distance: 40 m, ", ""),
+    )
+    (vehicle,) = vehicles(load(spec), ("lidar",))
+    for leg in library(vehicle, 0):
+        parts = (transition(vehicle, math.pi), leg.course, transition(vehicle, -0.5 * math.pi))
+        states = travelled(vehicle, joined(parts))
+        turned = Rotation.from_euler("ZYX", states.euler_rad[:, ::-1])
+        rates = (turned[:-1].inv() * turned[1:]).magnitude() / STEP_S
+        assert np.max(rates) <= math.radians(omega_max), leg.name

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import json
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -486,11 +487,28 @@ def test_what_is_refused(spec: Path, tmp_path: Path) -> None:
     assert not store.exists()
 
 
+def at_calendar_times(path: Path, begun: datetime) -> None:
+    """The log with ISO 8601 times from a moment (UTC) on instead of seconds."""
+    head, *rows = path.read_text(encoding="utf-8").splitlines()
+    names = head.split(",")
+    at = names.index("time_s")
+    cells = [row.split(",") for row in rows]
+    first = float(cells[0][at])
+    names[at] = "time"
+    for row in cells:
+        moment = begun + timedelta(seconds=float(row[at]) - first)
+        row[at] = moment.isoformat(timespec="microseconds") + "Z"
+    path.write_text("\n".join(map(",".join, [names, *cells])) + "\n", encoding="utf-8")
+
+
 def test_a_real_run_end_to_end(spec: Path, tmp_path: Path) -> None:
-    """Two logs of one vehicle; the second under another name again is refused."""
+    """Two logs of one vehicle, the later one first, with calendar times; the second under another
+    name again is refused."""
     for k in range(2):
         log = make_log(scenario("multirotor_lines", 4 + k, 30.0, 5.0), ())
-        log.to_csv(tmp_path / f"run{k}.csv")
+        at_calendar_times(
+            log.to_csv(tmp_path / f"run{k}.csv"), datetime(2026, 10, 2 - k, 23, 59, 50)
+        )
         (tmp_path / "spec.yaml").write_text(log.spec_yaml(), encoding="utf-8")
     store, own = tmp_path / "store.jsonl", tmp_path / "spec.yaml"
     for k in range(2):
@@ -501,6 +519,12 @@ def test_a_real_run_end_to_end(spec: Path, tmp_path: Path) -> None:
     before = store.read_bytes()
     assert watch(store, own).exit_code == 0
     assert store.read_bytes() == before  # who looks again leaves it as it is
+    document = told(own, store, tmp_path, 0)
+    assert document["ordered_by"] == "date"
+    assert [(one["files"], one["date"]) for one in document["runs"]] == [
+        (["run0.csv"], "2026-10-02T23:59:50Z"),
+        (["run1.csv"], "2026-10-01T23:59:50Z"),
+    ]
     (tmp_path / "again.csv").write_bytes((tmp_path / "run1.csv").read_bytes() + b"\n")
     found = watch(store, own, tmp_path / "again.csv")
     assert found.exit_code == 2

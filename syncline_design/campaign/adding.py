@@ -50,7 +50,7 @@ def kept(one: SearchedLog, digest: str, promise: SpecPromise | None) -> Run:
     weighed = weigh(one, promise)
     log = data.view.log
     white = zip(data.structure.white, model.level.factor, strict=True)
-    first_s = float(log.time_s[0])
+    first_s = log.since_s + float(log.time_s[0])
     return Run(
         files=one.inputs.files,
         sha256=digest,

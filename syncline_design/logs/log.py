@@ -84,6 +84,7 @@ class Log:
     thinned: rows of a very long log that are not in the windows kept of it.
     laid: the turns (beside a shift) by which the truth was laid onto what was measured, where
     nothing relates their frames: what is constant between the two is then no witness of anything.
+    since_s: what the stamps count from [s since 1970] where they were calendar times, else 0.
     """
 
     kind: LogKind
@@ -96,6 +97,7 @@ class Log:
     notes: tuple[str, ...] = ()
     thinned: int = 0
     laid: Turns | None = None
+    since_s: float = 0.0
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])

@@ -218,6 +218,7 @@ def _log(
         rejected=rejected,
         notes=tuple(draft.notes),
         thinned=draft.table.thinned,
+        since_s=draft.table.since_s,
     )
 
 

@@ -43,6 +43,7 @@ class LogTable:
     """One file: SI name -> values (n,) by rising stamp, with NaN where a value is missing.
 
     rows: of the file; rejected: left out of these, by reason; thinned: left out as too many.
+    since_s: the midnight (UTC) that calendar times count from [s since 1970]; 0 of plain numbers.
     """
 
     path: Path
@@ -52,6 +53,7 @@ class LogTable:
     rows: int = 0
     rejected: Mapping[str, int] = field(default_factory=dict)
     thinned: int = 0
+    since_s: float = 0.0
 
     def __len__(self) -> int:
         return int(self.columns[TIME].shape[0])
@@ -210,7 +212,9 @@ def _on_one_scale(files: list[_Open]) -> list[_Open]:
     shown = np.datetime64(origin, "ns").astype("datetime64[s]")
     note = f"times are UTC, in seconds since {shown}Z"
     moved = [
-        f if f.day is None else replace(f, seconds=f.seconds + (f.day - origin) / NANOSECONDS)
+        f
+        if f.day is None
+        else replace(f, seconds=f.seconds + (f.day - origin) / NANOSECONDS, day=origin)
         for f in files
     ]
     return [replace(moved[0], notes=(*moved[0].notes, note)), *moved[1:]]
@@ -269,4 +273,5 @@ def _table(file: _Open, rows: Arranged) -> LogTable:
         count,
         rejected,
         rows.thinned,
+        (file.day or 0) / NANOSECONDS,
     )

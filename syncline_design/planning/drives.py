@@ -240,12 +240,14 @@ def held(vehicle: Vehicle, steps: int) -> CourseCommands:
 
 @dataclass(frozen=True, slots=True)
 class DrivenLeg:
-    """One leg in a whole drive: from when to when, and the heading it begins at [rad]."""
+    """One leg in a whole drive: from when to when, the heading it begins at and the turn to that,
+    with which it begins [rad]."""
 
     leg: Leg
     from_s: float
     to_s: float
     heading_rad: float
+    turn_rad: float
 
 
 def whole_drive(
@@ -262,7 +264,8 @@ def whole_drive(
             for own, one in zip(parts, world.courses_of(leg.stage, course), strict=True):
                 own.append(one)
             steps += len(course)
-        found.append(DrivenLeg(leg, begun * STEP_S, steps * STEP_S, QUARTER_RAD * placed.heading))
+        heading_rad = QUARTER_RAD * placed.heading
+        found.append(DrivenLeg(leg, begun * STEP_S, steps * STEP_S, heading_rad, placed.turn_rad))
     return tuple(found), [joined(own) for own in parts]
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
-from syncline_design.planning.path import GRAVITY_MPS2, STEP_S, CourseCommands
-from syncline_design.planning.vehicle import Vehicle
+from syncline_design.planning.path import STEP_S, CourseCommands
+from syncline_design.planning.vehicle import GRAVITY_MPS2, Vehicle
 
 LINE_S = 20.0
 SHORT_S = 4.0
@@ -59,7 +59,7 @@ def turning(vehicle: Vehicle, speed: float, angles: list[float]) -> CourseComman
     """Turns by some angles [rad] one after the other, at one speed held from ramp to ramp."""
     rate = vehicle.turn_radps(speed)
     counts = [max(round(abs(a) / rate / STEP_S), 1) for a in angles]
-    ahead = ramps(vehicle, [(speed, STEP_S * (sum(counts) + 40))], vehicle.join_mps)
+    ahead = ramps(vehicle, [(speed, STEP_S * sum(counts) + _room_s(vehicle))], vehicle.join_mps)
     turn = np.zeros_like(ahead)
     at = (len(ahead) - sum(counts)) // 2
     for angle, count in zip(angles, counts, strict=True):
@@ -68,12 +68,17 @@ def turning(vehicle: Vehicle, speed: float, angles: list[float]) -> CourseComman
     return _course(ahead, turn=turn)
 
 
+def _room_s(vehicle: Vehicle) -> float:
+    """Time straight on beside turns, so that rounding does not carry them into changes of speed."""
+    return max(2.0, 4.0 * vehicle.rounding_s)
+
+
 def transition(vehicle: Vehicle, angle_rad: float) -> CourseCommands:
     """The turn between two legs, at the joining speed."""
     speed = vehicle.join_mps
     rate = vehicle.turn_radps(speed) if speed > 0.0 else vehicle.turn_radps(0.0)
     count = max(round(abs(angle_rad) / rate / STEP_S), 1) if angle_rad else 0
-    rest = round(2.0 * vehicle.usual.rounding_s / STEP_S)
+    rest = round(2.0 * vehicle.rounding_s / STEP_S)
     turn = np.concatenate([np.zeros(rest), np.full(count, angle_rad / max(count * STEP_S, STEP_S)),
                            np.zeros(rest)])  # fmt: skip
     return _course(np.full(turn.shape, speed), turn=turn)
@@ -191,7 +196,7 @@ def _sway(v: Vehicle, sideways: bool) -> tuple[str, CourseCommands] | None:
     omega = FULL_RAD * cycles / SWEEP_S
     speed = min(GRAVITY_MPS2 * math.tan(lean) / omega, 0.4 * v.v_max_mps)
     swing = speed * _wave(SWEEP_S, cycles)
-    rounded = speed * math.exp(-0.5 * (omega * v.usual.rounding_s) ** 2)  # a Gaussian's of a sine
+    rounded = speed * math.exp(-0.5 * (omega * v.rounding_s) ** 2)  # a Gaussian's of a sine
     leans = math.degrees(math.atan(rounded * omega / GRAVITY_MPS2))
     zero = np.zeros_like(swing)
     axis, name = ("roll", "sideways") if sideways else ("pitch", "to and fro")
@@ -204,9 +209,9 @@ def _rock(v: Vehicle) -> tuple[str, CourseCommands] | None:
     """Turns to and fro: an aeroplane rolls, others yaw."""
     speed = v.join_mps if v.motion == "fixed_wing" else _turning_speed(v)
     rate, cycles = v.turn_radps(speed), 4
-    period = max(3.0, 4.0 * v.usual.rounding_s, SWEEP_S / cycles)
+    period = max(3.0, 4.0 * v.rounding_s, SWEEP_S / cycles)
     swing = rate * _wave(period * cycles, cycles)
-    ahead = ramps(v, [(speed, period * cycles + 2.0)], v.join_mps)
+    ahead = ramps(v, [(speed, period * cycles + _room_s(v))], v.join_mps)
     turn = np.zeros_like(ahead)
     at = (len(ahead) - len(swing)) // 2
     turn[at : at + len(swing)] = swing

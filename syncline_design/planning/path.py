@@ -16,9 +16,8 @@ import numpy as np
 from syncline_design.effects.kinematics import euler_to_rotation, rotate
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.planning.vehicle import SEA_RATE_SHARE, SEA_TILT, Vehicle
+from syncline_design.planning.vehicle import GRAVITY_MPS2, SEA_RATE_SHARE, SEA_TILT, Vehicle
 
-GRAVITY_MPS2 = 9.80665
 STEP_S = 0.05
 SEA_HZ = (0.09, 0.13, 0.16, 0.21)  # swell and wind sea
 ROLL_SHARE, PITCH_SHARE = 1.0, 0.5  # of the sea's tilt
@@ -86,7 +85,7 @@ def travelled(
     from scipy.ndimage import gaussian_filter1d
 
     def rounded(values: Array) -> Array:
-        smooth = vehicle.usual.rounding_s / STEP_S
+        smooth = vehicle.rounding_s / STEP_S
         return np.asarray(gaussian_filter1d(values, smooth, mode="nearest"))
 
     time_s = start_s + STEP_S * np.arange(len(course), dtype=np.float64)

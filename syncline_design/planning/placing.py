@@ -160,10 +160,13 @@ class Placed:
 @dataclass(frozen=True, slots=True)
 class LegsEnd:
     """Where some legs end: north and east [m], which of the four headings the last one had, the
-    heading now, and when; box_m: what they took on their way, south, north, west and east."""
+    heading now, and when; box_m: what they took on their way, south, north, west and east.
+
+    A drive begins straight ahead, northwards: the way back is north where nothing was driven.
+    """
 
     place_m: Place = (0.0, 0.0)
-    before: int = 0
+    before: int = 2
     heading_rad: float = 0.0
     end_s: float = 0.0
     box_m: Box = (0.0, 0.0, 0.0, 0.0)

@@ -14,7 +14,8 @@ SCHEMA: Final = "syncline-design/plan/v1"
 
 @dataclass(frozen=True, slots=True)
 class PlannedLeg(Record):
-    """One leg: from when to when [s], what to do, who drives, and the heading it begins with."""
+    """One leg: from when to when [s], what to do, who drives, the heading it has after the turn
+    with which it begins, and that turn (right: above 0)."""
 
     name: str
     from_s: float
@@ -22,6 +23,7 @@ class PlannedLeg(Record):
     words: str
     stage: str
     heading_deg: float
+    turn_deg: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.model.system import System
-from syncline_design.planning.drives import WholeDrive, World
+from syncline_design.planning.drives import DrivenLeg, WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
 from syncline_design.planning.from_diagnosis import cautions_of
 from syncline_design.planning.information import (
@@ -230,12 +230,24 @@ class Telling:
                 f"{k} {one.leg.name}",
                 one.from_s,
                 one.to_s,
-                one.leg.words + self._meanwhile(one.leg.stage),
+                self._with_turn(one) + self._meanwhile(one.leg.stage),
                 self.setup.system.stages[one.leg.stage].name,
                 math.degrees(one.heading_rad) % 360.0,
+                math.degrees(one.turn_rad),
             )
             for k, one in enumerate(found.stretches, start=1)
         )
+
+    def _with_turn(self, one: DrivenLeg) -> str:
+        """What to do in a leg, from the turn on with which it begins."""
+        angle = round(math.degrees(one.turn_rad))
+        if angle == 0:
+            return one.leg.words
+        vehicle = self.setup.world.vehicles[one.leg.stage]
+        how = f"at {to_digits(vehicle.join_mps, 2)} m/s" if vehicle.join_mps else "on the spot"
+        side = "right" if angle > 0 else "left"
+        words = one.leg.words
+        return f"Turn {side} by {abs(angle)} deg {how}, then {words[0].lower()}{words[1:]}"
 
     def _meanwhile(self, stage: int) -> str:
         """What the other vehicles of a chain do."""

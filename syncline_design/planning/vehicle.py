@@ -22,6 +22,8 @@ ACROSS: Final = 0.8  # of the acceleration, for turns
 SEA_TILT: Final = 3.0  # the horizon's tilt is so many standard deviations of the sea's motion
 SEA_RATE_SHARE: Final = 0.12  # of omega_max that the sea's own turn rate is at most (rms)
 MOST_TILT_RAD: Final = math.radians(30.0)
+GRAVITY_MPS2: Final = 9.80665
+LEANING: Final = ("multirotor", "fixed_wing")  # motions that lean with their acceleration
 BELOW: Final = ("mbes", "sonar", "usbl", "echo", "imaging_sonar", "multibeam")
 LONGEST_TURN_S: Final = 3600.0  # a turn about that takes longer is none
 HEIGHT_SHARE: Final = 0.6  # of the range d that the targets lie below
@@ -99,6 +101,22 @@ class Vehicle:
             return 0.0
         quickest = math.sqrt(ACROSS * self.acceleration_mps2 * self.turn_radius_m)
         return min(max(self.slowest_mps, self.fast_mps / 3.0, quickest), self.fast_mps)
+
+    @property
+    def rounding_s(self) -> float:
+        """Standard deviation of the Gaussian that rounds commands [s].
+
+        Who leans by atan(a / g) goes from one side to the other at 2 a / (g s sqrt(2 pi)), which
+        has to stay as far below omega_max as turns do.
+        """
+        usual = self.usual.rounding_s
+        if self.motion not in LEANING:
+            return usual
+        across = ACROSS * self.acceleration_mps2
+        if self.motion == "fixed_wing":
+            across = max(v * self.turn_radps(v) for v in (self.fast_mps, self.join_mps))
+        slope = 2.0 * across / (GRAVITY_MPS2 * math.sqrt(2.0 * math.pi))
+        return max(usual, slope / (TURN_SHARE * self.omega_max_radps))
 
     def turn_radps(self, speed_mps: float) -> float:
         """Largest turn rate at a speed: omega_max, a lateral acceleration, a radius."""

@@ -11,6 +11,7 @@ from syncline_design.machine.records import with_texts
 from syncline_design.model.figure_text import format_duration, format_like, format_quantity
 from syncline_design.model.quantity import si_name, split_suffix, suffix_unit
 from syncline_design.model.unit_table import Dimension
+from syncline_design.planning.path import PathStates
 from syncline_design.planning.result import Flown, Plan, Separated
 from syncline_design.planning.run import LONGEST_S
 from syncline_design.planning.telling import PlanRun
@@ -42,6 +43,7 @@ Row = tuple[Cell | str, ...]
 FIRST_ORDER: Final = "as far as their effects of first order go"  # a large lag is no latency
 ONE: Final = "on every leg that it can drive they make the same error"
 AT_SIZE: Final = "at the size that is known, in these minutes"
+STANDS_MPS: Final = 0.01  # below which a vehicle is at rest
 MOST_TARGETS: Final = 12  # told outside the page
 
 
@@ -55,7 +57,7 @@ def on_plan(run: PlanRun) -> Document:
         sentences=tuple(_sentences(found)),
         facts=tuple(_facts(found)),
         sections=(
-            *section("legs", "Legs", _legs(found)),
+            *section("legs", "Legs", _legs(found, run.path)),
             *section("path", "Path", _path(run), reach="page"),
             *section("after", "What is known after each leg", _after(found), "After"),
             *section("pairs", "Told apart", _pairs(found), "Pairs"),
@@ -213,7 +215,7 @@ def _column_sizes(found: Plan) -> dict[str, float]:
     return sizes
 
 
-def _legs(found: Plan) -> list[Node]:
+def _legs(found: Plan, path: PathStates) -> list[Node]:
     several = len({leg.stage for leg in found.legs}) > 1
     rows = [
         (leg.name, numbers.typeset(f"{_clock(leg.from_s)} to {_clock(leg.to_s)}"),
@@ -221,7 +223,9 @@ def _legs(found: Plan) -> list[Node]:
         for leg in found.legs
     ]  # fmt: skip
     heads = ("Leg", "From, to", "Heading", *(["Stage"] if several else []), "What to do")
-    words = "Each leg begins with the turn to its heading, at the speed at which the last ended."
+    begun_mps = math.hypot(*path.velocity_mps[0])
+    how = f"at {numbers.speed(begun_mps, 2)}" if begun_mps > STANDS_MPS else "at rest"
+    words = f"The drive begins {how}, and so does every leg; its turn counts as its time."
     return [*show(table("Legs", heads, rows), silent=True), Text(words, quiet=True)]
 
 
