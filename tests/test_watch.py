@@ -427,6 +427,21 @@ def test_runs_are_ordered_by_date_where_all_have_one(spec: Path, tmp_path: Path)
     assert since == ["day5.csv"] * 3
 
 
+def test_a_change_that_was_undone_is_told_as_both(spec: Path, tmp_path: Path) -> None:
+    """Ten bounds in runs 5 and 6 of 12 alone: since 5 so much, and since 7 as much less."""
+    base, moved = 20.0 * BOUND, np.array([14.0, 0, 0, 0, 0]) * BOUND
+    for seed in range(4):
+        rng = np.random.default_rng(100 + seed)
+        found = [statistics(rng, base + moved * (k in (4, 5))) for k in range(12)]
+        store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found)])
+        up, down = told(spec, store, tmp_path, 1)["alarms"]
+        assert [a["effect"] for a in (up, down)] == ["latency", "latency"]
+        assert [a["since"]["run"] for a in (up, down)] == [5, 7]
+        assert up["change"] == pytest.approx(14.0 * BOUND[0], rel=0.35)
+        assert down["change"] == pytest.approx(-14.0 * BOUND[0], rel=0.35)
+        store.unlink()
+
+
 def test_two_changes_are_two_alarms(spec: Path, tmp_path: Path) -> None:
     found = series(14, 6, 0.0 * BOUND, 9)
     rng = np.random.default_rng(15)

@@ -219,13 +219,14 @@ class Watching:
         found: list[Seen] = []
         changes, look = self.changes, len(self.ordered)
         while len(found) < MOST_CHANGES:
-            total, table = changes.log_evidence(look)
+            at = look
+            total, table = changes.log_evidence(at)
             if found and total < self.threshold:
                 break
-            if not found and total < math.log(2.0):  # it went back: as it stood when it rang
-                total, table = changes.log_evidence(first)
-                return (_best(changes, first, table, first, total),)
-            found.append(_best(changes, look, table, first, total))
+            if not found and total < math.log(2.0):  # it went back, which is a change of its own
+                at = first
+                total, table = changes.log_evidence(at)
+            found.append(_best(changes, at, table, first, total))
             changes = changes.without(found[-1].change)
         return tuple(found)
 
