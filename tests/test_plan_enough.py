@@ -52,12 +52,35 @@ def asked(folder: Path, minutes: float, effort: Effort | None = None) -> PlanRun
     return planned(load(spec_with(folder, (", area: [250 m, 250 m]", ""))), request)
 
 
-def test_the_least_that_is_said_to_be_enough_is_hardly_more_than_enough(tmp_path: Path) -> None:
+class Judged(list[int]):
+    """How many legs each drive had that was judged whole."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        whole = enough.whole_information
+
+        def counted(world: World, legs: list[LegTold]) -> Array:
+            self.append(len(legs))
+            return whole(world, legs)
+
+        patch.setattr(enough, "whole_information", counted)
+
+
+@pytest.fixture(scope="module")
+def free(tmp_path_factory: pytest.TempPathFactory) -> tuple[PlanRun, int]:
+    """A search of whatever effort, with too little time, and how many drives it judged whole."""
+    with pytest.MonkeyPatch.context() as patch:
+        judged = Judged(patch)
+        return asked(tmp_path_factory.mktemp("free"), 0.2), len(judged)
+
+
+def test_the_least_that_is_said_to_be_enough_is_hardly_more_than_enough(
+    free: tuple[PlanRun, int], tmp_path: Path
+) -> None:
     """What a drive tells grows with its time: it goes in the end to what is asked, within 3 %.
 
     A twentieth less than the least is not enough, judged by the same plan with fewer minutes.
     """
-    short = asked(tmp_path, 0.2)
+    short, _ = free
     least = short.result.least_minutes
     assert not short.result.reached
     assert least is not None
@@ -162,23 +185,13 @@ def test_a_search_ends_where_its_effort_does(tmp_path: Path) -> None:
 
 
 def test_whole_drives_count_and_what_is_only_better_is_left(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    free: tuple[PlanRun, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A search of limited effort is enough as well, takes longer drives, and judges fewer whole."""
-    judged: list[int] = []
-    whole = enough.whole_information
-
-    def counted(world: World, legs: list[LegTold]) -> Array:
-        judged.append(len(legs))
-        return whole(world, legs)
-
-    monkeypatch.setattr(enough, "whole_information", counted)
-    free = asked(tmp_path, 0.2)
-    without = len(judged)
-    effort = Effort(most=3000)
+    judged, effort = Judged(monkeypatch), Effort(most=3000)
     limited = asked(tmp_path, 0.2, effort)
-    assert 0 < len(judged) - without < 0.5 * without
-    least, more = free.result.least_minutes, limited.result.least_minutes
+    assert 0 < len(judged) < 0.5 * free[1]
+    least, more = free[0].result.least_minutes, limited.result.least_minutes
     assert least is not None
     assert more is not None
     assert least <= more < 1.3 * least

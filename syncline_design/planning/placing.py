@@ -238,3 +238,8 @@ def _turned(moved: Place, heading: int) -> Place:
 def lasting_s(sequence: Sequence[LegTold]) -> float:
     """Of all legs with the turns between them."""
     return way_of(sequence).end_s
+
+
+def legs_s(sequence: Sequence[LegTold]) -> float:
+    """Of all legs alone."""
+    return sum(told.leg.duration_s for told in sequence)

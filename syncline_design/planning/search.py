@@ -29,7 +29,15 @@ from syncline_design.planning.information import (
     schur,
     sigmas,
 )
-from syncline_design.planning.placing import LegTold, Place, Placed, arranged, lasting_s, way_of
+from syncline_design.planning.placing import (
+    LegTold,
+    Place,
+    Placed,
+    arranged,
+    lasting_s,
+    legs_s,
+    way_of,
+)
 from syncline_design.planning.wanted import Goal, PairGoal
 
 NONCENTRALITY: Final = 60.0  # at which a rival fits worse by more than 15 nat nine times in ten
@@ -376,7 +384,8 @@ def best_within(search: LegSearch, most_s: float) -> list[LegTold]:
     plan = search.bettered(plan, most_s)
     worth = search.value(plan)[1]
     seen = search.looked_at(lambda one: one.value(search.margin)[1], worth)
-    within = (legs for _, legs in seen if lasting_s(legs) <= most_s and search.fits(legs))
+    short = (legs for _, legs in seen if legs_s(legs) <= most_s)  # without turns: quick to tell
+    within = (legs for legs in short if lasting_s(legs) <= most_s and search.fits(legs))
     return next(within, plan)
 
 
