@@ -75,7 +75,9 @@ def cadence(series: Series) -> Cadence:
     off = interval - steps * period
     usual = (steps > 0) & (steps < 3)
     jitter = scatter(off[usual]) / np.sqrt(2.0)
-    within = float(np.mean(np.abs(off[usual]) < REGULAR * period)) if usual.any() else 0.0
+    # few intervals of an irregular sensor may look even by chance: all of them have to
+    told = usual if interval.size >= _LEAST_BY_CHANCE else steps > 0
+    within = float(np.mean(np.abs(off[told]) < REGULAR * period)) if usual.any() else 0.0
     # how an irregular sensor betrays itself: its intervals do not add up
     even = within > 0.93
     regular = even and not _walks(off, usual, period)

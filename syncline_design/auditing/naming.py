@@ -15,6 +15,7 @@ from syncline_design.model.figure_text import signed, to_digits
 
 _SMALL: Final = 0.1  # of the largest stretch: rates that are hardly another
 _LEAST_S: Final = 2e-5
+_SURELY: Final = 100  # standard deviations
 
 
 def all_named(shapes: Sequence[Shape], time_s: Array) -> Iterator[StampFault]:
@@ -64,14 +65,14 @@ def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
                        "ppm_high": float(rate.max())}  # fmt: skip
         words += f" in the mean, between {signed(rate.min(), 3)} and {signed(rate.max(), 3)} ppm"
     span = in_words(float(np.ptp(moved)))
-    words += f": {span} over the log, {to_digits(sure, 3)} times its uncertainty"
+    words += f": {span} over the log, {_times(sure)} its uncertainty"
     return StampFault("drift", parameters, None, None, words)
 
 
 def _named(shape: Shape, time_s: Array) -> StampFault:
     end = float(time_s[-1])
     size = -shape.size_s
-    sure = f"{to_digits(abs(shape.size_s) / max(shape.sigma_s, 1e-12), 3)} times its uncertainty"
+    sure = f"{_times(abs(shape.size_s) / max(shape.sigma_s, 1e-12))} its uncertainty"
     if shape.kind in ("step", "episode"):
         stop = end if shape.kind == "step" else shape.end_s
         lasts = "and stay so" if shape.kind == "step" else f"until {to_digits(stop, 4)} s"
@@ -85,6 +86,11 @@ def _named(shape: Shape, time_s: Array) -> StampFault:
         "relock", {"seconds": size, "settling_s": shape.settle_s}, shape.begin_s, stop,
         f"stamps {away} again: {_signed(size)}, time constant {to_digits(shape.settle_s, 3)} s",
     )  # fmt: skip
+
+
+def _times(sure: float) -> str:
+    """How often a size is its uncertainty; beyond what any model of noise holds for, no figure."""
+    return f"{to_digits(sure, 3)} times" if sure < _SURELY else f"more than {_SURELY} times"
 
 
 def _signed(size_s: float) -> str:

@@ -20,6 +20,7 @@ from syncline_design.auditing.grains import timers
 from syncline_design.auditing.jumps import Jump, without_jumps
 from syncline_design.auditing.levels import SURE, believed, polished, shapes_of
 from syncline_design.auditing.naming import all_named
+from syncline_design.auditing.plain_step import without_plain_step
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds
 from syncline_design.auditing.settling import settled
@@ -33,6 +34,7 @@ _OTHER_TICKS: Final = 3  # receipts that show a tick
 _MOST_OF_TICK: Final = 0.5  # that waits fill, where whole ticks are to be told from others
 _MET: Final = 0.8  # of those that missed a tick; by chance at most half
 _OTHER_RATE: Final = 0.3  # of an interval
+_CHANCE: Final = 4.0  # sigma of a mean interval, of sensors without a rhythm
 _LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
 
 
@@ -75,6 +77,9 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     moved = _slow_shifts(series, places, time_s, late, least_s, mended.settling_s)
     near_s = 2.0 * moved.blocks.length_s if moved.blocks is not None else 0.0
     faults = _joined(mended.faults, moved.faults, near_s)
+    if moved.blocks is None and not faults:  # few messages
+        whole, faults = without_plain_step(moved.series, cadence(series), least_s)
+        moved = replace(moved, series=whole)
     return replace(moved, faults=faults, shifts=(*own, *moved.shifts))
 
 
@@ -192,8 +197,10 @@ def _changes_rate(time_s: Array, shape: Shape, blocks: Blocks) -> bool:
         near = [time_s[(time_s > a) & (time_s < b)] for a, b in spans]
         if min(part.size for part in near) < 8:
             continue
-        one, other = (float(np.mean(np.diff(part))) for part in near)
-        if abs(one - other) > _OTHER_RATE * min(one, other):
+        waits = [np.diff(part) for part in near]
+        one, other = (float(np.mean(part)) for part in waits)
+        chance = _CHANCE * float(np.sqrt(sum(np.var(part) / part.size for part in waits)))
+        if abs(one - other) > max(_OTHER_RATE * min(one, other), chance):
             return True
     return False
 

@@ -35,7 +35,7 @@ def without_slips(series: Series, known_s: float | None) -> Shifts:
         return nothing
     places = series.places()
     late = seconds((series.receive - series.stamp)[places])
-    middle = float(np.median(late))
+    middle = _usual(late)
     late = late - _slope(series.seconds[places], late)
     if spread(late - np.round(late - middle)) > _BLUR_S:
         return nothing  # delays that are as long as a slip
@@ -43,7 +43,7 @@ def without_slips(series: Series, known_s: float | None) -> Shifts:
     if not turns.any():
         return nothing
     base = _right(late + (known_s or 0.0), turns, known_s is not None)
-    turns = np.round(late - float(np.median(late[turns == base])))
+    turns = np.round(late - _usual(late[turns == base]))
     single = 1 + np.flatnonzero((turns[1:-1] != turns[:-2]) & (turns[:-2] == turns[2:]))
     turns[single] = turns[single - 1]  # one late message ends no stretch
     pace = cadence(series)
@@ -60,6 +60,11 @@ def without_slips(series: Series, known_s: float | None) -> Shifts:
         for b, e in found if (b, e) not in own and e == places.size
     )  # fmt: skip
     return Shifts(replace(series, stamp=moved), faults, others, None)
+
+
+def _usual(late: Array) -> float:
+    """The middle of them [s], one that is among them: between two levels lies none."""
+    return float(np.sort(late)[late.size // 2])
 
 
 def _slope(time_s: Array, late: Array) -> Array:
@@ -123,6 +128,8 @@ def _side_of(
     stamp = (series.stamp[b] - series.stamp[a]) / NS
     receive = (series.receive[b] - series.receive[a]) / NS
     expected = float(b - a) * pace.period_s  # messages between may be left out, as duplicates are
+    if not pace.regular:
+        return "unknown"
     odd_stamp, odd_receive = abs(stamp - expected), abs(receive - expected)
     if odd_receive > 0.6 and odd_stamp < 0.4:
         return "receipt"

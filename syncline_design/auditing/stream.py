@@ -44,6 +44,7 @@ from syncline_design.auditing.stream_epochs import (
     known_offset,
     with_epoch,
 )
+from syncline_design.auditing.stuck import without_stuck
 from syncline_design.auditing.wrong_receipts import without_wrong_receipts
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
@@ -100,6 +101,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     raw = in_order_of_receipt(_take(without_wrong_receipts(recorded), found))
     series, unit, step_ns = _in_one_unit(raw, found, stamps.primary_factor)
     series = _take(without_lone_slips(series), found)
+    series = _take(without_stuck(series), found)
     disorder = disorder_of(series)
     series = disorder.put(series)
     if disorder.fault is None:
