@@ -63,6 +63,7 @@ class Draft:
     factor: int = 1
     disorder: float = 0.0  # share of receipts noted out of order
     spoiled: NDArray[np.bool_] | None = None  # messages whose delay is not in the bound
+    wrong_s: Array | None = None  # by how much receipts are wrong
 
 
 def draft(rng: np.random.Generator, rate: float | None = None, law: str = "gamma") -> Draft:
@@ -127,6 +128,8 @@ def finish(d: Draft, name: str, sound_as: str = "") -> Made:
     receive_ns = d.start_ns + np.round(receive * 1e9).astype(np.int64)
     if d.whole_ns is not None:
         stamp_ns = d.whole_ns(stamp_ns)
+    if d.wrong_s is not None:
+        receive_ns += np.round(d.wrong_s * 1e9).astype(np.int64)
     used = (receive - d.true)[~d.spoiled] if d.spoiled is not None else receive - d.true
     if d.keep is not None:
         stamp_ns, receive_ns = stamp_ns[d.keep], receive_ns[d.keep]
@@ -320,6 +323,43 @@ def unset_stamps(d: Draft) -> None:
     d.planted.append("unset_stamps")
 
 
+def _somewhere(d: Draft, most: int) -> NDArray[np.int64]:
+    """One message, some, or the first or the last of the log."""
+    n = d.true.size
+    where = d.rng.choice(["one", "some", "first", "last"])
+    if where in ("first", "last"):
+        return np.asarray([0 if where == "first" else n - 1])
+    inside = np.arange(n // 20, n - n // 20, 7)
+    return np.sort(d.rng.choice(inside, 1 if where == "one" else most, replace=False))
+
+
+def wrong_receipts(d: Draft) -> None:
+    """Figures that are damaged, of any size that no thread waits for; a block of them at times."""
+    n = d.true.size
+    least = max(0.1, 60.0 * d.theta, 6.0 / d.rate)
+    size = 10.0 ** d.rng.uniform(np.log10(least), 8.0) * d.rng.choice([-1.0, 1.0])
+    places = _somewhere(d, 5)
+    if places[0] == n - 1 and size > 0.0:
+        size = max(size, 1.0)
+    if places.size > 1 and d.rng.uniform() < 0.5:  # longer than it is off, so that receipts fall
+        places = places[0] + np.arange(int(d.rng.integers(6, 40)))
+        size = np.sign(size) * max(abs(size), 2.0 * places.size / d.rate)
+    d.wrong_s = np.zeros(n)
+    d.wrong_s[places] = size
+    d.spoiled = d.wrong_s != 0.0
+    d.planted.append("wrong_receipts")
+    d.sizes["seconds"] = float(size)
+
+
+def wild_stamps(d: Draft) -> None:
+    """By seconds to years, one, several, the first or the last."""
+    places = _somewhere(d, int(d.rng.integers(2, 9)))
+    sizes = 10.0 ** d.rng.uniform(1.2, 8.0, places.size) * d.rng.choice([-1.0, 1.0], places.size)
+    d.stamp[places] += sizes
+    d.spoiled = np.isin(np.arange(d.true.size), places)
+    d.planted.append("backward_jump")
+
+
 def ahead_of_receipt(d: Draft) -> None:
     d.stamp = d.stamp + d.base + d.theta * 10 + d.rng.uniform(0.002, 0.4)
     d.planted.append("ahead_of_receipt")
@@ -329,7 +369,8 @@ FAULTS: dict[str, Callable[[Draft], None]] = {
     f.__name__: f
     for f in (epoch_offset, whole_second_slip, step, drift, counter_wrap, relock, packetised,
               truncated_stamps, stamped_on_arrival, duplicates, backward_jump, gap, lost_messages,
-              unset_stamps, ahead_of_receipt, whole_second_late, whole_packets)
+              unset_stamps, ahead_of_receipt, whole_second_late, whole_packets, wrong_receipts,
+              wild_stamps)
 }  # fmt: skip
 PAIRS = (
     ("epoch_offset", "drift"), ("epoch_offset", "whole_second_slip"), ("step", "gap"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from syncline_design.auditing.run import audit
 from syncline_design.cli.app import app
 from syncline_design.report.result_schemas import result_schema
+from tests.flight_logs import flight, write_ros2
 
 START = 1_700_000_000_000_000_000
 TAI_AHEAD = 37
@@ -256,3 +259,12 @@ def test_a_table_of_no_numbers_is_not_sound(tmp_path: Path) -> None:
     found = run(log)
     assert found.exit_code == 2
     assert "no message in it has a time" in found.stderr
+
+
+def test_every_file_of_a_bag_s_folder_is_evidence(tmp_path: Path) -> None:
+    """Each by its content, as a plain file is."""
+    bag = write_ros2(tmp_path / "bag", flight(2.0))
+    found = {Path(one.file).name: one.sha256 for one in audit([bag]).evidence}
+    inside = {one.name: hashlib.sha256(one.read_bytes()).hexdigest() for one in bag.iterdir()}
+    assert len(inside) > 1
+    assert found == inside

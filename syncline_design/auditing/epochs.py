@@ -27,6 +27,10 @@ _SCALES: Final = (
     (-LEAP_S, "gps", "stamps in UTC, receipts in GPS time: 18 leap seconds"),
     (TAI_S - LEAP_S, "tai_gps", "stamps in TAI, receipts in GPS time: 19 s"),
     (LEAP_S - TAI_S, "tai_gps", "stamps in GPS time, receipts in TAI: 19 s"),
+    (TAI_S - 1.0, "tai", "stamps in TAI by 36 leap seconds, as they were from July 2015 to 2016"),
+    (1.0 - TAI_S, "tai", "receipts in TAI by 36 leap seconds, as they were from July 2015 to 2016"),
+    (LEAP_S - 1.0, "gps", "stamps in GPS time by 17 leap seconds, those of July 2015 to 2016"),
+    (1.0 - LEAP_S, "gps", "receipts in GPS time by 17 leap seconds, those of July 2015 to 2016"),
 )
 _EPOCHS: Final = (
     (-GPS_EPOCH_S, "gps_epoch", "stamps count from 1980-01-06, receipts from 1970"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -62,7 +62,7 @@ def audit(paths: Sequence[Path]) -> Audit:
         incomplete=damaged[0] if damaged else None,
         damaged=damaged,
         unreadable=refused,
-        evidence=tuple(_evidence(o.path) for o in opened),
+        evidence=tuple(one for o in opened for one in _evidence(o.path)),
         notes=_notes(rows),
         version=__version__,
     )
@@ -255,5 +255,7 @@ def _notes(rows: Sequence[StreamAudit]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _evidence(path: Path) -> FileRead:
-    return FileRead(str(path), content_of(path))
+def _evidence(path: Path) -> Iterator[FileRead]:
+    """A file, or every file of a bag's folder, by its content."""
+    inside = sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]
+    yield from (FileRead(str(one), content_of(one)) for one in inside)

@@ -45,6 +45,7 @@ from syncline_design.auditing.stream_epochs import (
     with_epoch,
 )
 from syncline_design.auditing.stuck import without_stuck
+from syncline_design.auditing.wild_times import without_wild_times
 from syncline_design.auditing.wrong_receipts import without_wrong_receipts
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
@@ -98,7 +99,8 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     assert stamps is not None
     found: list[StampFault] = []
     recorded = series_of(stamps.primary_ns, _receipts(stamps), start)
-    raw = in_order_of_receipt(_take(without_wrong_receipts(recorded), found))
+    recorded = _take(without_wild_times(recorded), found)
+    raw = in_order_of_receipt(_with_wild_ones(without_wrong_receipts(recorded), found))
     series, unit, step_ns = _in_one_unit(raw, found, stamps.primary_factor)
     series = _take(without_lone_slips(series), found)
     series = _take(without_stuck(series), found)
@@ -208,6 +210,24 @@ def _continuous(series: Series, disorder: Disorder, found: list[StampFault]) -> 
     if disorder.order is None or disorder.wrong is None:
         return mended  # in their place, where they show by themselves
     return _take(order.without_wrong(mended, disorder.wrong), found)
+
+
+def _with_wild_ones(left: order.Repaired, found: list[StampFault]) -> Series:
+    """Without messages whose times are wild; wrong receipts of both ways of telling are one."""
+    for fault in left.faults:
+        alike = next((f for f in found if f.fault == fault.fault == "wrong_receipts"), None)
+        if alike is None:
+            found.append(fault)
+            continue
+        count = float(alike.parameters["count"]) + float(fault.parameters["count"])
+        span = [t for f in (alike, fault) for t in (f.from_s, f.to_s) if t is not None]
+        sizes = [float(f.parameters["seconds"]) for f in (alike, fault)]
+        parts: dict[str, float | str] = {"count": count, "seconds": max(sizes, key=abs)}
+        found[found.index(alike)] = replace(
+            alike, parameters=parts, from_s=min(span), to_s=max(span),
+            evidence=f"{alike.evidence}; {fault.evidence}",
+        )  # fmt: skip
+    return left.series
 
 
 def _take(repaired: order.Repaired, found: list[StampFault]) -> Series:

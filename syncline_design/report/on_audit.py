@@ -67,7 +67,7 @@ MEND: Final[Mapping[str, str]] = {
     "end_of_scan": "declare which end of a scan the stamp is of",
     "start_of_scan": "declare which end of a scan the stamp is of",
     "duplicates": "drop the repeated messages, or mend the driver that stamps anew too late",
-    "backward_jump": "sort by stamp; look at what set the clock",
+    "backward_jump": "leave out what is far off, sort the rest; look at what set the clock",
     "gap": "leave the stretch out; look at cable, driver and recorder",
     "lost_messages": "enlarge queues, lower the rate; nothing to mend in the stamps",
     "unset_stamps": "drop these messages; wait for the first fix before recording",
