@@ -94,9 +94,13 @@ def _wrong_of(
     beside = [k for k in (begin - 1, end) if 0 <= k < stamp.size]
     off, own = away[begin:end], stamp[begin:end]
     reach = round((_STEADY + (end - begin) * (len(beside) == 1)) * usual * NS)
-    if np.any(own < stamp[beside].min() - reach) or np.any(own > stamp[beside].max() + reach):
+    low, high = int(stamp[beside].min()) - reach, int(stamp[beside].max()) + reach
+    if np.any(own < low) or np.any(own > high):
         known = _is_another(own, stamp[beside], off)
         return None if known or not _is_no_transport(off, run, stamp.size) else "stamp"
+    put_back = own + np.round(off * NS).astype(np.int64)
+    if np.all((put_back >= low) & (put_back <= high)) and _is_slip(off):
+        return None  # of events that come seldom: their stamps may be as wrong
     if np.all(off < 0.0):
         return "receipt"
     if end == stamp.size:
@@ -115,15 +119,18 @@ def _is_no_transport(off: Array, run: tuple[int, int], size: int) -> bool:
 
 def _is_another(own: NDArray[np.int64], beside: NDArray[np.int64], off: Array) -> bool:
     """Whether such stamps are whole seconds or 1024 weeks off, or of a counter that began anew."""
-    whole = np.round(off)
-    slipped = np.abs(off - whole) < _WHOLE_S
-    if np.all(slipped & (np.abs(whole) < _SLIP_S)):
+    if _is_slip(off):
         return True
     weeks = seconds(np.abs(own - int(beside[0]))) * NS / (1024 * WEEK_NS)
     turned = np.abs(weeks - np.round(weeks)) * 1024 * WEEK_NS / NS < 3600.0
     if np.all(turned & (np.round(weeks) > 0)):
         return True
     return bool(np.all((own >= 0) & (own < _ANEW * float(np.abs(beside).min()))))
+
+
+def _is_slip(off: Array) -> bool:
+    whole = np.round(off)
+    return bool(np.all((np.abs(off - whole) < _WHOLE_S) & (np.abs(whole) < _SLIP_S)))
 
 
 def _falls(receive: NDArray[np.int64]) -> int:
