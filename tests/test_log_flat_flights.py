@@ -338,3 +338,16 @@ def test_a_table_named_for_a_part_that_it_does_not_play_is_refused(tmp_path: Pat
     choice = LogChoice.model_validate({"columns": MAPPED, "streams": {"ranging": "truth"}})
     with pytest.raises(BadInput, match="no columns of a ranging"):
         row_sources(files, choice, ["uav"], poses=False)
+
+
+def test_an_origin_beside_heights_above_sea_level_alone_is_said(tmp_path: Path) -> None:
+    """DataFlash knows no ellipsoid: with an origin above it down is off by the geoid's 47 m."""
+    files = [made.write_dataflash(tmp_path / "f.bin", TRUTH, FIXES),
+             made.write_tum(tmp_path / "r.tum", TRUTH)]  # fmt: skip
+    choice = LogChoice.model_construct(origin=ORIGIN, frame="enu", body="flu")
+    sources = row_sources(files, choice, ["uav"], False)
+    notes = [note for one in sources for note in one.notes]
+    assert [n for n in notes if "so that of the spec's origin is taken" in n]
+    beside = [made.write_pos(tmp_path / "f.pos", FIXES), files[1]]
+    notes = [n for one in row_sources(beside, choice, ["uav"], False) for n in one.notes]
+    assert not [n for n in notes if "so that of the spec's origin is taken" in n]

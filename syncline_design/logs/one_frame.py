@@ -64,6 +64,13 @@ def on_one_datum(
                 one.columns.pop("height_m", None)
                 one.columns.pop(POSITION[2], None)
                 one.note("its height is above sea level, the other's above the ellipsoid: not used")
+    elif False in told.values() and None in told.values():
+        for one in placed:
+            if told[id(one)] is False:
+                one.note(
+                    "its height is above sea level, and so that of the spec's origin is taken "
+                    "to be: where that is above the ellipsoid, down is off by the geoid's height"
+                )
 
 
 def in_one_frame(
