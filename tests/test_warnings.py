@@ -6,6 +6,8 @@ import csv
 import io
 import json
 import math
+import re
+from pathlib import Path
 
 import pytest
 
@@ -14,7 +16,7 @@ from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
-from syncline_design.spec.load import load_text
+from syncline_design.spec.load import load, load_text
 from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
@@ -43,6 +45,7 @@ stages:
       timestamping: {{error: {{distribution: constant, value: 0 s}}}}
       lever_arm: [-8 m, 0 m, 0 m]
 """
+ROOT = Path(__file__).resolve().parent.parent
 WORST = "worst-case-above-limit"
 
 
@@ -114,6 +117,18 @@ def test_warnings_say_what_they_are_about() -> None:
             assert warned.key
         if warned.code == "waiver":
             assert warned.requirement == "LOW"
+
+
+def test_figures_without_a_source_are_listed_once_with_their_entries() -> None:
+    """Of the relayed ROV: JSON has a warning an entry, readers get one for the same figures."""
+    found = check_loaded(load(ROOT / "specs" / "rov_relay.yaml"), CheckSettings())
+    told = [one for one in found.warnings if one.code == "assumption"]
+    shown = " ".join(console(on_verdict(found), colour=False).split())
+    lines = re.findall(r"! assumption, no public source: .*? \(assumption\)", shown)
+    assert len(lines) == len({one.key for one in told}) < len(told)
+    for one in told:
+        (line,) = [line for line in lines if f"source: {one.key} of " in line]
+        assert str(one.entry) in line.replace(",", " ").split()
 
 
 @pytest.mark.parametrize("form", ["json", "html", "junit", "sarif", "github", "markdown", "csv"])

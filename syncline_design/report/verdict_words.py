@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 
 SEEN_SHARE = 0.001  # of the total: smaller terms have no row
+OF_FIGURES: Final = ("assumption", "transcript")  # warnings that name figures of an entry
 
 
 def larger(entries: Sequence[LedgerRow]) -> list[LedgerRow]:
@@ -97,9 +98,24 @@ def qualification(verdict: Verdict | Optimization) -> str:
 def warning_nodes(cautions: Sequence[Caution]) -> list[Node]:
     """Warnings as a list: the sentence, then the code to filter by."""
     entries: tuple[Inline, ...] = tuple(
-        (given(entry.message), " (", code(entry.code), ")") for entry in cautions
+        (given(message), " (", code(kind), ")") for kind, message in _once(cautions)
     )
     return [Items(entries, "!", "warn")] if entries else []
+
+
+def _once(cautions: Sequence[Caution]) -> list[tuple[str, str]]:
+    """Codes and messages; of those that say the same figures of several entries, one for all."""
+    named: dict[tuple[str, str], list[str]] = {}
+    for one in cautions:
+        said, tail = one.message, f" of {one.entry}"
+        if one.code in OF_FIGURES and said.endswith(tail):
+            named.setdefault((one.code, said.removesuffix(tail)), []).append(str(one.entry))
+        else:
+            named.setdefault((one.code, said), [])
+    return [
+        (kind, f"{said} of {sentence_list(entries)}" if entries else said)
+        for (kind, said), entries in named.items()
+    ]
 
 
 def status_of(row: RequirementResult) -> Outcome:
