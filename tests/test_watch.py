@@ -24,7 +24,7 @@ from syncline_design.campaign.changes import REACH, Changes, weight_of
 from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.scatter import APART, DIFFERING, log_odds_apart
-from syncline_design.campaign.store import Stored, add_looks, add_run, read_store
+from syncline_design.campaign.store import Stored, add_looks, add_run, demand_new, read_store
 from syncline_design.campaign.watch_result import Watch
 from syncline_design.campaign.watching import Watching, WatchRequest
 from syncline_design.cli.app import app
@@ -32,7 +32,7 @@ from syncline_design.diagnosis.sufficient import Less, Sufficient
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects import registry
 from syncline_design.report.result_schemas import result_schema
-from syncline_design.spec.load import load
+from syncline_design.spec.load import BadInput, load
 from tests.world import make_log, scenario
 
 LABELS = (
@@ -439,6 +439,44 @@ def test_a_change_that_was_undone_is_told_as_both(spec: Path, tmp_path: Path) ->
         assert [a["since"]["run"] for a in (up, down)] == [5, 7]
         assert up["change"] == pytest.approx(14.0 * BOUND[0], rel=0.35)
         assert down["change"] == pytest.approx(-14.0 * BOUND[0], rel=0.35)
+        store.unlink()
+
+
+def test_what_differs_from_run_to_run_is_said(spec: Path, tmp_path: Path) -> None:
+    """Twenty bounds to and fro with every run: no change, but no one value either."""
+    rng = np.random.default_rng(31)
+    base = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+    off = np.array([10.0, 0, 0, 0, 0]) * BOUND
+    found = [statistics(rng, base + (off if k % 2 else -off)) for k in range(12)]
+    store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found)])
+    (said,) = told(spec, store, tmp_path, 0)["cautions"]
+    assert said.startswith("latency (position) of car has another value in every run")
+    size, unit = said.split("differ by ")[1].split()[:2]
+    spread = float(np.std([-10.0, 10.0] * 6, ddof=1)) * BOUND[0]
+    assert unit in ("ms", "us", "µs")
+    assert float(size) * (1e-3 if unit == "ms" else 1e-6) == pytest.approx(spread, rel=0.25)
+    quiet = [statistics(rng, base) for _ in range(12)]
+    store.unlink()
+    store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(quiet)])
+    assert told(spec, store, tmp_path, 0)["cautions"] == []
+
+
+def test_a_run_of_the_time_of_another_is_refused(spec: Path, tmp_path: Path) -> None:
+    """A part of a run that is there already, or another logger's: of one minute are ten seconds of
+    which another run is; without a calendar nobody can tell."""
+    first, second = series(23, 2, 0.0 * BOUND, 9)
+    for date in (True, False):
+        begun = run_of(first, 0, date)
+        store = kept(spec, tmp_path, [begun])
+        stored = read_store(store)
+        assert stored is not None
+        for later_s, fits in ((55.0, True), (50.0, False), (-50.0, False), (60.0, True)):
+            other = replace(run_of(second, 1, date), first_s=begun.first_s + later_s)
+            if fits or not date:
+                demand_new(stored, other, store)
+                continue
+            with pytest.raises(BadInput, match=r"day1.csv is of the same time as run 1"):
+                demand_new(stored, other, store)
         store.unlink()
 
 

@@ -30,6 +30,7 @@ e-processes; Shin, Ramdas, Rinaldo, New England J. Stat. Data Sci. 2 (2024), on 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
@@ -53,6 +54,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
 EARLY: Final = 10.0  # runs after which a change is met half as often as at the first
 SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
+AS_CLEAR: Final = 2.0  # standard deviations of Q by which effects differ as clearly
 MOST_SCATTERED: Final = 2
 
 
@@ -90,16 +92,40 @@ class Group:
         return self.index[:, :, None], self.index[:, None, :]
 
 
+@dataclass(frozen=True, eq=False)
+class Differing:
+    """An effect that differs from run to run: how clearly [standard deviations of Q], and the
+    covariance by which it does beyond noise.
+
+    named: the commonest that differs as clearly.
+    """
+
+    term: Term
+    clear: float
+    covariance: Array
+    named: Differing | None = None
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviation by parameter."""
+        found: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return found
+
+
 @dataclass(frozen=True, slots=True)
 class Runs:
     """Information and score of runs, their sum with the prior and its inverse, and the scatter of
-    each effect."""
+    each effect.
+
+    freed: what clearly differs from run to run.
+    """
 
     normal: Array
     score: Array
     total: Array
     inverse: Array
     scatters: tuple[RunScatter, ...]
+    freed: tuple[Differing, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,10 +324,18 @@ class Changes:
                 one = self._scattering(found)
                 if one is None:
                     break
-                found = self._compared(look, *freed_of(found.normal, found.score, *one))
+                freed = (*found.freed, one)
+                own = one.term.index, one.covariance
+                found = self._compared(look, *freed_of(found.normal, found.score, *own))
+                found = replace(found, freed=freed)
             self._latest.clear()
             self._latest[look] = found
         return self._latest[look]
+
+    def differing(self, look: int) -> tuple[Differing, ...]:
+        """Effects that clearly differ from run to run, of the first `look` runs, by the names of
+        the commonest that do as clearly."""
+        return tuple(one.named or one for one in self._runs(look).freed)
 
     def _compared(self, look: int, normal: Array, score: Array) -> Runs:
         """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
@@ -319,19 +353,30 @@ class Changes:
             )
         return Runs(normal, score, total, inverse, tuple(found))
 
-    def _scattering(self, runs: Runs) -> tuple[Index, Array] | None:
-        """The effect that differs most clearly from run to run, and the covariance by which it does
-        beyond noise; None where noise would do.  One change is none: runs are parted at any."""
-        best, found = SCATTERED, None
-        for g, scatter in zip(self.groups, runs.scatters, strict=True):
-            least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
-            clear = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
-            k = int(np.argmax(clear))
-            if clear[k] > best:
-                own = g.index[k]
-                usual = inverted(runs.normal.mean(axis=0)[np.ix_(own, own)])
-                best, found = clear[k], (own, (least[k] / free[k] - 1.0) * usual)
-        return found
+    def _scattering(self, runs: Runs) -> Differing | None:
+        """The effect that differs most clearly from run to run; None where noise would do.  One
+        change is none: runs are parted at any."""
+        found = [
+            self._differing(runs, g, k, float(least), float(free))
+            for g, scatter in zip(self.groups, runs.scatters, strict=True)
+            for k, (least, free) in enumerate(
+                zip(scatter.square.min(axis=0), scatter.free.min(axis=0), strict=True)
+            )
+        ]
+        best = max(found, key=lambda one: one.clear)
+        if not best.clear > SCATTERED:
+            return None
+        alike = [one for one in found if one.clear > best.clear - AS_CLEAR]
+        return replace(best, named=min(alike, key=lambda one: commonness(one.term.label)))
+
+    def _differing(self, runs: Runs, group: Group, k: int, least: float, free: float) -> Differing:
+        own = group.index[k]
+        usual = inverted(runs.normal.mean(axis=0)[np.ix_(own, own)])
+        return Differing(
+            self.terms[int(group.terms[k])],
+            (least - free) / math.sqrt(2.0 * max(free, 1.0)),
+            (least / free - 1.0) * usual if free > 0.0 else 0.0 * usual,
+        )
 
     def _total(self, look: int, normal: Array, score: Array) -> Array:
         """Information of runs together, with the prior of what they show."""

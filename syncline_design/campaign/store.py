@@ -39,6 +39,7 @@ SCHEMA: Final = "syncline-design/store/v1"
 START: Final = "0" * 64
 MOST_BYTES: Final = 2**30
 MOST_DIFFERENCES: Final = 5
+OVERLAP: Final = 0.1  # of the shorter run: two that share more are of one drive
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +218,21 @@ def demand_new(stored: Stored | None, run: Run, path: Path) -> None:
     for one in stored.entries:
         if run.sha256 == one.run.sha256 or is_same(found, one.found):
             raise _twice(path, ", ".join(run.files), one)
+        if _overlap_s(run, one.run) > OVERLAP * min(run.duration_s, one.run.duration_s):
+            raise refused(
+                path,
+                f"{', '.join(run.files)} is of the same time as run {one.number} "
+                f"({', '.join(one.run.files)}): what it tells would count twice",
+                "a run of another time",
+            )
+
+
+def _overlap_s(one: Run, other: Run) -> float:
+    """Time that both runs are of, where a calendar's stamps tell."""
+    if one.date is None or other.date is None:
+        return 0.0
+    ends = (run.first_s + run.duration_s for run in (one, other))
+    return min(ends) - max(one.first_s, other.first_s)
 
 
 def add_run(

@@ -52,7 +52,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_digits
+from syncline_design.model.figure_text import format_estimate, to_digits
 from syncline_design.model.normal import NORMAL_95
 from syncline_design.spec.case import Case
 
@@ -364,6 +364,25 @@ class Watching:
                     f"noise of {sensor.replace('/', ', ')} in run {last.number} is "
                     f"{to_digits(factor / float(np.median(own)), 2)} times that of the runs before"
                 )
+        yield from self._differing()
+
+    def _differing(self) -> Iterator[str]:
+        """Effects that have another value in every run: no change, and nothing to count on."""
+        told = {one.change.term.label for one in self.seen}
+        for found in self.changes.differing(len(self.ordered)):
+            term = found.term
+            if term.label in told:
+                continue
+            sizes = " and ".join(
+                format_estimate(float(to_digits(float(size), 2)), None, one.unit)
+                for size, one in zip(found.spread, term.effect.slopes(), strict=True)
+            )
+            words = f"{term.effect.name.replace('_', ' ')} ({term.sensor})"
+            yield (
+                f"{words} of {self._stage(term.stage)} "
+                f"has another value in every run: they differ by {sizes} (standard deviation) more "
+                "than noise, which is no change since a run, and no one value of the build"
+            )
 
 
 def _best(changes: Changes, look: int, table: Array, first: int, total: float) -> Seen:

@@ -26,6 +26,7 @@ from syncline_design.planning.information import (
     drift_columns,
     expected_noise,
     fisher,
+    late,
     unknowns,
     with_shift,
 )
@@ -115,9 +116,9 @@ class World:
         factor = tuple(share * f for f in level.factor)
         return structure, NoiseLevel(factor, level.slow, level.time_constant_s, level.size)
 
-    def columns(self, view: Scene) -> Array:
+    def columns(self, view: Scene, after: Array | None = None) -> Array:
         """Slopes by every unknown, what pairs are beyond first order, what the noise shifts."""
-        first = with_shift(view, self.every)
+        first = with_shift(view, self.every, after)
         beyond = [one.columns(view) for one in self.beyond]
         return np.concatenate([first[:, :, :-1], *beyond, first[:, :, -1:]], axis=2)
 
@@ -150,8 +151,9 @@ class World:
             flown += [planned_log(self.system, one) for one in self.turned_about(courses)]
         whole, ends = one_after_another(flown, GAP_S)
         view = scene(self.system, whole, acting_of(self.system))
-        noise, slopes, known = self.noise(view), self.columns(view), len(self.every)
-        drifts = drift_columns(view, self.every, slopes[:, :, :known])
+        after = np.concatenate([late(whole.time_s[a:b]) for a, b in pairwise(ends) if b > a])
+        noise, slopes, known = self.noise(view), self.columns(view, after), len(self.every)
+        drifts = drift_columns(view, self.every, slopes[:, :, :known], after)
         slopes[:, :, :known] -= _since(whole.time_s, ends)[:, None, None] * drifts
         drifting = np.flatnonzero(np.any(drifts != 0.0, axis=(0, 1)))
         both = np.concatenate([slopes, drifts[:, :, drifting]], axis=2)

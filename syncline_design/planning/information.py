@@ -57,25 +57,36 @@ def unknowns(view: Scene) -> tuple[Unknown, ...]:
     )
 
 
-def columns(view: Scene, wanted: Sequence[Unknown]) -> Array:
-    """Slopes (n, 3, p) of the error by the parameters, at zero; a step in the middle."""
+def late(time_s: Array) -> Array:
+    """Which rows of a drive come after a step that happens in it, (n,)."""
+    return np.asarray(time_s - time_s[0] >= STEP_AT * (time_s[-1] - time_s[0]))
+
+
+def columns(view: Scene, wanted: Sequence[Unknown], after: Array | None = None) -> Array:
+    """Slopes (n, 3, p) of the error by the parameters, at zero.
+
+    after: rows that a step acts on; None: those of the later half.
+    """
     found: dict[str, Array] = {}
-    since = STEP_AT * (view.log.time_s[-1] - view.log.time_s[0])
+    acts = late(view.log.time_s) if after is None else after
     parts = []
     for one in wanted:
         c = one.candidate
         if c.key not in found:
-            at = {p.name: float(since) for p in c.effect.parameters if p.located}
-            found[c.key] = np.nan_to_num(effects_of.signature(view, c, at))
+            at = {p.name: 0.0 for p in c.effect.parameters if p.located}  # from the first row on
+            slopes = np.nan_to_num(effects_of.signature(view, c, at))
+            found[c.key] = slopes * acts[:, None, None] if at else slopes
         names = [p.name for p in c.effect.slopes()]
         parts.append(found[c.key][:, :, names.index(one.parameter.name)])
     return np.stack(parts, axis=-1) if parts else np.zeros((len(view), 3, 0))
 
 
-def drift_columns(view: Scene, wanted: Sequence[Unknown], first: Array) -> Array:
+def drift_columns(
+    view: Scene, wanted: Sequence[Unknown], first: Array, after: Array | None = None
+) -> Array:
     """How the columns grow with every second that a log's start lies further back."""
     rows = tuple(replace(r, start_s=float(r.time_s[0]) - 1.0) for r in view.rows)
-    later = columns(replace(view, rows=rows), wanted)
+    later = columns(replace(view, rows=rows), wanted, after)
     return later - first
 
 
@@ -180,9 +191,9 @@ def noise_shift(view: Scene) -> Array:
     return total[:, :, None]
 
 
-def with_shift(view: Scene, wanted: Sequence[Unknown]) -> Array:
+def with_shift(view: Scene, wanted: Sequence[Unknown], after: Array | None = None) -> Array:
     """The columns of the unknowns, and what the noise shifts as one more, (n, 3, p + 1)."""
-    return np.concatenate([columns(view, wanted), noise_shift(view)], axis=2)
+    return np.concatenate([columns(view, wanted, after), noise_shift(view)], axis=2)
 
 
 def covariance_of(information: Array, prior: Array | None = None) -> tuple[Array, Array]:

@@ -19,7 +19,9 @@ from syncline_design.planning.vehicle import GRAVITY_MPS2, Vehicle
 LINE_S = 20.0
 SHORT_S = 4.0
 SWEEP_S = 12.0
+SWING_S = 3.5  # from slow to fast on a circle, at most
 FULL_RAD = 2.0 * math.pi
+QUARTER_RAD = 0.5 * math.pi
 MOST_LEG_S = 300.0
 
 
@@ -156,6 +158,30 @@ def _circle(v: Vehicle, sign: float) -> tuple[str, CourseCommands]:
     return f"a full circle to the {side} at {_mps(speed)}", turning(v, speed, [sign * FULL_RAD])
 
 
+def _swinging_circle(v: Vehicle) -> tuple[str, CourseCommands] | None:
+    """Three times slow and fast on one circle: speed and direction change at once, so that a short
+    drive parts delays from lever arms.  It ends at a quarter of a turn.
+
+    Along 0.6 of the acceleration, across ACROSS = 0.8 of it, which are all of it together.
+    """
+    low = max(v.slowest_mps, 0.02 * v.v_max_mps)
+    high = max(min(v.fast_mps, low + 0.6 * v.acceleration_mps2 * SWING_S), v.join_mps)
+    if high <= 1.1 * low:
+        return None
+    ahead = ramps(v, [(high, 0.5), (low, 0.5)] * 3, v.join_mps)
+    tightest = max(high / v.turn_radps(high), v.turn_radius_m)
+    length = float(np.sum(np.abs(ahead))) * STEP_S
+    quarters = min(math.floor(length / tightest / QUARTER_RAD), 4)
+    if quarters < 1:
+        return None
+    radius = length / (quarters * QUARTER_RAD)
+    words = (
+        f"on a circle to the right of {to_digits(radius, 2)} m radius, three times from "
+        f"{_mps(low)} up to {_mps(high)} and back, {90 * quarters} deg in all"
+    )
+    return words, _course(ahead, turn=ahead / radius)
+
+
 def _turning_speed(v: Vehicle) -> float:
     """A speed at which the vehicle turns well: where acceleration and omega_max both bind."""
     best = 0.8 * v.acceleration_mps2 / (TURNS_WELL * v.omega_max_radps)
@@ -245,6 +271,7 @@ MAKERS: dict[str, Maker] = {
     "right circle": lambda v: _circle(v, 1.0),
     "left circle": lambda v: _circle(v, -1.0),
     "figure eight": _eight,
+    "slow and fast circle": _swinging_circle,
     "ahead and astern": _reverse,
     "hover and spin": _spin,
     "roll sweeps": lambda v: _sway(v, True),

@@ -187,6 +187,8 @@ class LegsEnd:
         if told.room is None:
             return self._placed(told, ways[costs.index(min(costs))])
         order = sorted(range(len(ways)), key=costs.__getitem__)
+        if self.end_s == 0.0:  # turned to first only where straight on it does not fit
+            order.sort(key=lambda k: abs(ways[k].turn_rad))
         found = (self._placed(told, ways[k]) for k in order)
         fitting = (one for one in found if one[1].within(told.area_m))
         return next(fitting, None) or self._placed(told, ways[order[0]])

@@ -85,7 +85,7 @@ def _outcome(found: Plan) -> Outcome:
     if found.least_minutes is None:
         why = "no drive of this platform tells it" if found.inseparable else _none_found(found)
         return Outcome("bad", "\u2717", f"Not reachable: {why}")
-    return Outcome("bad", "\u2717", f"Not reachable in {numbers.number(found.minutes, 6)} min")
+    return Outcome("bad", "\u2717", f"Not reached in {numbers.number(found.minutes, 6)} min")
 
 
 def _none_found(found: Plan) -> str:
@@ -102,7 +102,10 @@ def _sentences(found: Plan) -> Iterator[Inline]:
         if found.duration_s > 60.0 * found.minutes:
             length = _minutes(found.duration_s / 60.0)
             below = f"No drive as short as {given} was found: below is one of {length}."
-        yield f"The least that is enough: {least}. {below}"
+        yield f"The least that is enough, of the drives looked at: {least}. {below}"
+    if not found.reached and found.flown is not None and found.flown.reached:
+        files, length = ", ".join(found.flown.files), numbers.time(found.flown.duration_s)
+        yield f"What was flown ({files}) is enough: it reaches what is asked in {length}."
     for words in found.inseparable:
         larger = _larger(found)
         if larger is not None and words == f"{larger.first} and {larger.second}":
@@ -115,11 +118,18 @@ def _sentences(found: Plan) -> Iterator[Inline]:
         asked = "else that" if found.inseparable else "that"
         yield (
             f"All {asked} is asked is reached, and none of the other effects that a drive can tell "
-            "apart would take it, left free one at a time."
+            f"apart would take it, left free one at a time{_steps(found)}."
         )
     if found.confused:
         yield _would_take(found.confused)
     yield from found.cautions or ()
+
+
+def _steps(found: Plan) -> str:
+    """Where a step of stamps is looked for, where a delay is asked for."""
+    if not any(key.startswith("latency(") for key in found.after[-1].sigma):
+        return ""
+    return " (a step of the stamps in the middle of the drive: one before what tells is a delay)"
 
 
 def _would_take(confused: Sequence[str]) -> str:
