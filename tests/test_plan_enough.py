@@ -93,7 +93,11 @@ def test_the_least_that_is_said_to_be_enough_is_hardly_more_than_enough(
     assert 0.97 <= sigma / tolerance <= 1.0
     assert not asked(tmp_path, 0.95 * least).result.reached
     words = " ".join(render_plan("markdown", short).split()).replace("\u202f", " ")
-    said = float(words.split("The least that is enough, of the drives looked at: ")[1].split()[0].replace("\u00a0", ""))
+    said = float(
+        words.split("The least that is enough, of the drives looked at: ")[1]
+        .split()[0]
+        .replace("\u00a0", "")
+    )
     assert least <= said <= 1.01 * least
 
 
