@@ -99,3 +99,14 @@ def test_scales_of_before_2017_have_a_name(size_s: float, kind: str) -> None:
     assert (fault.fault, fault.parameters["kind"]) == ("epoch_offset", kind)
     assert fault.parameters["seconds"] == size_s
     assert "2015" in fault.evidence
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_clock_that_is_set_and_settles_within_a_second_is_no_wrong_receipt(sign: float) -> None:
+    """Its stamps never fall, and lie among the others as those of wrong receipts do."""
+    when, receive, _ = sensor(6)
+    since = when - 40.0
+    stamp = when + np.where(since > 0.0, sign * 0.3 * np.exp(-np.maximum(since, 0.0) / 0.4), 0.0)
+    names = {fault.fault for fault in of(stamp, receive).faults}
+    assert "wrong_receipts" not in names
+    assert names & {"relock", "step", "backward_jump"}

@@ -101,12 +101,27 @@ def _wrong_of(
     put_back = own + np.round(off * NS).astype(np.int64)
     if np.all((put_back >= low) & (put_back <= high)) and _is_slip(off):
         return None  # of events that come seldom: their stamps may be as wrong
+    if not _receipts_jump(stamp, receive, run, usual):
+        return None
     if np.all(off < 0.0):
         return "receipt"
     if end == stamp.size:
         return "receipt" if np.all(off > max(_LATE_AT_END_S, far)) else None
     overtakes = int(receive[end - 1]) - int(receive[end]) > 0.5 * float(off.min()) * NS
     return "receipt" if np.all(off > 0.0) and overtakes else None
+
+
+def _receipts_jump(
+    stamp: NDArray[np.int64], receive: NDArray[np.int64], run: tuple[int, int], usual: float
+) -> bool:  # fmt: skip
+    """Whether receipts leave the usual interval where a run begins and ends, more than stamps: a
+    clock that is set ahead and settles keeps its stamps in order as well."""
+    edges = [k for k in run if 0 < k < stamp.size]
+    odd = [
+        [abs(float(times[k] - times[k - 1]) / NS - usual) for k in edges]
+        for times in (stamp, receive)
+    ]
+    return all(of_stamps < of_receipts for of_stamps, of_receipts in zip(*odd, strict=True))
 
 
 def _is_no_transport(off: Array, run: tuple[int, int], size: int) -> bool:
