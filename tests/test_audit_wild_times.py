@@ -110,3 +110,12 @@ def test_a_clock_that_is_set_and_settles_within_a_second_is_no_wrong_receipt(sig
     names = {fault.fault for fault in of(stamp, receive).faults}
     assert "wrong_receipts" not in names
     assert names & {"relock", "step", "backward_jump"}
+
+
+@pytest.mark.parametrize("length_s", [0.4, 0.8, 1.5])
+def test_what_a_host_held_up_for_long_makes_no_receipt_behind_it_wrong(length_s: float) -> None:
+    """More messages wait than tell the level: those that came in time are not early."""
+    when, receive, _ = sensor(7, 200.0)
+    held = (when > 40.0) & (when < 40.0 + length_s)
+    late = np.maximum.accumulate(np.maximum(receive, np.where(held, 40.0 + length_s, 0.0)))
+    assert "wrong_receipts" not in {fault.fault for fault in of(when, late).faults}

@@ -27,6 +27,7 @@ _AROUND: Final = 60  # messages on each side that tell the level
 _FAR_S: Final = 0.05
 _SPREADS: Final = 20.0  # of the delays
 _MOST: Final = 0.05  # of all messages: more are how the stream is
+_WIDE, _LOW = 600, 5.0  # messages, per cent of them: no host holds up all of so many
 _AT_END: Final = 3  # messages: a clock that was set is told by four
 _OLD_S: Final = 5.0  # by which a message may be held up on its way while others pass
 _STEADY: Final = 0.5  # of an interval
@@ -104,7 +105,10 @@ def _wrong_of(
     if not _receipts_jump(stamp, receive, run, usual):
         return None
     if np.all(off < 0.0):
-        return "receipt"
+        late = seconds(receive - stamp)
+        wide = np.concatenate([late[max(0, begin - _WIDE) : begin], late[end : end + _WIDE]])
+        early = float(late[begin:end].max()) < float(np.percentile(wide, _LOW)) - 0.5 * far
+        return "receipt" if early else None  # the others may have waited for a host
     if end == stamp.size:
         return "receipt" if np.all(off > max(_LATE_AT_END_S, far)) else None
     overtakes = int(receive[end - 1]) - int(receive[end]) > 0.5 * float(off.min()) * NS
