@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -424,6 +425,9 @@ def test_runs_are_ordered_by_date_where_all_have_one(spec: Path, tmp_path: Path)
         document = told(spec, store, folder, 1)
         assert document["ordered_by"] == ("date" if date else "adding")
         since.append(document["alarms"][0]["since"]["file"])
+        listed = watch(store, spec).stdout.split("\nRuns\n")[1].split("What this rests on")[0]
+        shown = [int(day) for day in re.findall(r"day(\d)\.csv", listed)]
+        assert shown == (sorted(order) if date else list(order))
     assert since == ["day5.csv"] * 3
 
 

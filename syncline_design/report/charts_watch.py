@@ -28,21 +28,21 @@ MOST: Final = 1e12
 
 
 def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
-    """E-values over the runs, logarithmic."""
-    numbers_of = [r.run for r in runs]
+    """E-values over the runs in the order in which they are compared, logarithmic."""
+    numbers_of, places = [r.run for r in runs], range(len(runs))
     values = [min(max(r.e_value or 0.0, 1e-3), MOST) for r in runs]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        axes.plot(numbers_of, values, marker="o", markersize=3.5, color=SERIES[0])
-        for run, value in zip(numbers_of, values, strict=True):
-            tell(axes, run, value, [("Run", str(run)), ("e-value", numbers.number(value, 3))])
+        axes.plot(places, values, marker="o", markersize=3.5, color=SERIES[0])
+        for place, run, value in zip(places, numbers_of, values, strict=True):
+            tell(axes, place, value, [("Run", str(run)), ("e-value", numbers.number(value, 3))])
         axes.axhline(threshold, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
         low, high = 0.7 * min(values), 2.0 * max(*values, threshold)
         axes.set_ylim(low, high)
         scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), lambda v: numbers.number(v, 6))
-        _whole_ticks(axes, numbers_of)
+        _run_ticks(axes, numbers_of)
         axes.set_xlabel("run")
         axes.set_ylabel("e-value")
         scales.grid(axes, "y")
@@ -55,17 +55,18 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
 
 
 def courses(
-    runs: Sequence[WatchedRun], keys: Sequence[Key], since: Mapping[Key, int],
+    runs: Sequence[WatchedRun], keys: Sequence[Key], since: Mapping[Key, Sequence[int]],
     name: str = "fig-courses",
 ) -> InlineChart:  # fmt: skip
-    """A small panel a parameter: values of single runs with their intervals."""
+    """A small panel a parameter: values of single runs with their intervals, in the order in which
+    the runs are compared; since: the runs with which it changed."""
     across = min(ACROSS, len(keys))
     rows = math.ceil(len(keys) / across)
 
     def build(figure: Figure) -> None:
         for place, key in enumerate(keys):
             axes = add_axes(figure, rows, across, place + 1)
-            _panel(axes, runs, key, since.get(key), many=across > 1)
+            _panel(axes, runs, key, since.get(key, ()), many=across > 1)
 
     changed = ", ".join(f"{e} ({s})" for e, s, *_ in since) or "none"
     spoken = f"{len(keys)} parameters over {len(runs)} runs; changed: {changed}"
@@ -74,32 +75,33 @@ def courses(
 
 
 def _panel(
-    axes: Axes, runs: Sequence[WatchedRun], key: Key, since: int | None, *, many: bool
+    axes: Axes, runs: Sequence[WatchedRun], key: Key, since: Sequence[int], *, many: bool
 ) -> None:
-    points = [(r.run, v) for r in runs for v in r.values if _key(v) == key]
-    shown = [(run, v) for run, v in points if v.interval95 is not None]
+    points = [(place, v) for place, r in enumerate(runs) for v in r.values if _key(v) == key]
+    shown = [(place, v) for place, v in points if v.interval95 is not None]
     scale, unit = _scale([v.interval95 or () for _, v in shown], key[3])
-    colour = BAD if since is not None else SERIES[0]
-    for run, v in shown:
+    colour = BAD if since else SERIES[0]
+    for place, v in shown:
         low, high = v.interval95 or (0.0, 0.0)
-        tell(axes, run, v.value / scale, [
-            ("Run", str(run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
+        tell(axes, place, v.value / scale, [
+            ("Run", str(runs[place].run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
             ("Value", f"{numbers.number(v.value / scale, 4)} {unit}"),
             ("95 % interval", _interval(low / scale, high / scale, unit)),
         ])  # fmt: skip
-        axes.plot([run, run], [low / scale, high / scale], color=colour, linewidth=1.2)
-    axes.plot([run for run, _ in shown], [v.value / scale for _, v in shown], "o", color=colour,
+        axes.plot([place, place], [low / scale, high / scale], color=colour, linewidth=1.2)
+    axes.plot([place for place, _ in shown], [v.value / scale for _, v in shown], "o", color=colour,
               markersize=2.8)  # fmt: skip
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    if since is not None:
-        axes.axvline(since - 0.5, color=BAD, linewidth=1.0, linestyle=(0, (4, 3)))
+    for place, r in enumerate(runs):
+        if r.run in since:
+            axes.axvline(place - 0.5, color=BAD, linewidth=1.0, linestyle=(0, (4, 3)))
     effect, sensor, _, parameter = key
     name = effect.replace("_", " ")
     title = f"{shortened(name, 26)}\n{sensor}" if many else shortened(f"{name} ({sensor})", 40)
     axes.set_title(title, loc="left", pad=3)
     figure, _, _ = parameter.rpartition("_")
     axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
-    _whole_ticks(axes, [r.run for r in runs])
+    _run_ticks(axes, [r.run for r in runs])
     axes.margins(x=0.06)
 
 
@@ -187,3 +189,10 @@ def _whole_ticks(axes: Axes, runs: Sequence[int]) -> None:
     ticks = list(range(min(runs), max(runs) + 1, step))
     axes.set_xticks(ticks)
     axes.set_xticklabels([numbers.count(t) for t in ticks])
+
+
+def _run_ticks(axes: Axes, runs: Sequence[int]) -> None:
+    """Numbers of runs at their places."""
+    places = range(0, len(runs), max(1, math.ceil(len(runs) / 6)))
+    axes.set_xticks(list(places))
+    axes.set_xticklabels([numbers.count(runs[place]) for place in places])

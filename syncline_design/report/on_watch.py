@@ -119,7 +119,9 @@ def _sentence(one: Alarm) -> str:
         return f"Since {place}: {one.words}."
     near = ""
     if one.since.low != one.since.high:
-        near = f", with 95 % one of the runs {one.since.low} to {one.since.high}"
+        first, last = one.since.low_date, one.since.high_date
+        ends = f"{first} to {last}" if first and last else f"{one.since.low} to {one.since.high}"
+        near = f", with 95 % one of the runs {ends}"
     name = _name(one)
     return (
         f"{name[0].upper()}{name[1:]}: {_parameter(one)} changed by {one.text} with {place}{near}."
@@ -172,8 +174,15 @@ def _odd(found: Watch) -> list[Node]:
     return [*nodes, *torn_nodes(found.torn)]
 
 
+def _compared(found: Watch) -> list[WatchedRun]:
+    """The runs in the order in which they are compared."""
+    if found.ordered_by == "adding":
+        return list(found.runs)
+    return sorted(found.runs, key=lambda one: (one.baseline, one.date or "", one.run))
+
+
 def _evidence(found: Watch) -> list[Node]:
-    runs = [r for r in found.runs if r.e_value is not None]
+    runs = [r for r in _compared(found) if r.e_value is not None]
     if len(runs) < 2:
         return []
     caption = "E-value after each run since the baseline; an alarm from the dashed line on."
@@ -182,10 +191,12 @@ def _evidence(found: Watch) -> list[Node]:
 
 def _effects(found: Watch) -> list[Node]:
     """The changed effects, then every other, folded; those of one run have no course."""
-    runs = [r for r in found.runs if r.values]
+    runs = [r for r in _compared(found) if r.values]
     if len(runs) < 2:
         return []
-    since = {(a.effect, a.sensor, a.stage, a.parameter): a.since.run for a in found.alarms}
+    since: dict[tuple[str, str, str, str], list[int]] = {}
+    for a in found.alarms:
+        since.setdefault((a.effect, a.sensor, a.stage, a.parameter), []).append(a.since.run)
     keys = sorted(
         dict.fromkeys((v.effect, v.sensor, v.stage, v.parameter) for r in runs for v in r.values),
         key=lambda key: (key not in since, key),
@@ -212,7 +223,7 @@ def _effects(found: Watch) -> list[Node]:
 
 def _runs(found: Watch) -> list[Node]:
     heads = ("Run", "File", "First stamp", "Rows #", "Alone", "Named alone", "E-value #")
-    return latest("Runs", heads, [_row(one) for one in found.runs], MOST_RUNS)
+    return latest("Runs", heads, [_row(one) for one in _compared(found)], MOST_RUNS)
 
 
 def _row(one: WatchedRun) -> Sequence[Cell | str]:
