@@ -274,11 +274,11 @@ def test_a_week_that_begins_again_is_said(tmp_path: Path) -> None:
     assert any("begin again 1 times" in note for note in stream.notes)
 
 
-def test_an_impossible_record_ends_an_sbet(tmp_path: Path) -> None:
+def test_an_impossible_record_of_an_sbet_costs_itself(tmp_path: Path) -> None:
     table = flight(200)
     table[150, 1] = 3.0  # a latitude beyond the pole
     recording = opened(tmp_path, table.astype("<f8").tobytes())
-    assert only(recording).messages == 150
+    assert only(recording).messages == 199
     assert recording.incomplete is not None
     assert "record 151" in recording.incomplete.reason
 
