@@ -184,7 +184,7 @@ def _said(case: Case, one: Assumed, evidence: _Evidence, seed: int) -> Iterator[
 
 def _notes(verdict: Verdict, evidence: _Evidence) -> Iterator[str]:
     if verdict.verdict != "meets":
-        yield f"on paper the spec's verdict is {verdict.verdict}: there is nothing to accept"
+        yield f"on paper the spec's verdict is `{verdict.verdict}`: there is nothing to accept"
     for name, study in evidence.clocks.items():
         yield from (f"clock of {name}: {note}" for note in study.timing.notes)
     if evidence.stamps is not None:
