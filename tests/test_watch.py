@@ -484,6 +484,24 @@ def test_a_run_of_the_time_of_another_is_refused(spec: Path, tmp_path: Path) -> 
         store.unlink()
 
 
+@pytest.mark.parametrize(("bounds", "seed", "rang"), [(2.5, 203, 8), (3.8, 212, 9)])
+def test_an_alarm_stays_when_earlier_days_come_in(
+    spec: Path, tmp_path: Path, bounds: float, seed: int, rang: int
+) -> None:
+    """A day that is added late weakens what later ones told; what rang rings until it is accepted.
+    Seeds that were searched for: alarms near the limit, in days that come in to and fro."""
+    order = (0, 1, 7, 2, 8, 3, 9, 4, 5, 6)
+    found = series(seed, 10, np.array([bounds, 0, 0, 0, 0]) * BOUND, 7)
+    store = kept(spec, tmp_path, [run_of(found[day], day) for day in order[:rang]])
+    looked(spec, store)
+    assert told(spec, store, tmp_path, 1)["alarms"][0]["first_run"] <= rang
+    add_run(store, "car", pinned_system(load(spec)), run_of(found[order[rang]], order[rang]))
+    looked(spec, store)
+    document = told(spec, store, tmp_path, 1)
+    assert all((one["e_value"] or 0.0) < 20.0 for one in document["runs"])
+    assert document["alarms"][0]["first_run"] == rang
+
+
 def test_two_changes_are_two_alarms(spec: Path, tmp_path: Path) -> None:
     found = series(14, 6, 0.0 * BOUND, 9)
     rng = np.random.default_rng(15)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -175,8 +175,11 @@ class Watching:
     @cached_property
     def keys(self) -> tuple[str, ...]:
         """Of the look after each run."""
+        return self._keys(self.ordered)
+
+    def _keys(self, runs: Sequence[Entry]) -> tuple[str, ...]:
         listed = [self.pool.labels, [term.label for term in self.pool.terms]]
-        return tuple(keys_of(listed, [entry.line for entry in self.ordered]))
+        return tuple(keys_of(listed, [entry.line for entry in runs]))
 
     @cached_property
     def kept(self) -> tuple[KeptLook, ...]:
@@ -215,6 +218,8 @@ class Watching:
         """Changes that were alarmed at any look so far, the strongest first."""
         first = next((k + 2 for k, e in enumerate(self.course) if e >= self.threshold), None)
         if first is None:
+            first = self._rang
+        if first is None:
             return ()
         found: list[Seen] = []
         changes, look = self.changes, len(self.ordered)
@@ -229,6 +234,19 @@ class Watching:
             found.append(_best(changes, at, table, first, total))
             changes = changes.without(found[-1].change)
         return tuple(found)
+
+    @cached_property
+    def _rang(self) -> int | None:
+        """The place from 1 of the run whose look rang when it was added, before runs of earlier
+        dates came in; an alarm stays, whatever is added."""
+        if self.doubted is not None:
+            return None
+        added = sorted(self.ordered, key=lambda entry: entry.number)
+        for n in range(2, len(added)):
+            look = self.stored.looks.get(self._keys(tuple(by_date(tuple(added[:n]))))[-1])
+            if look is not None and look.log_evidence >= self.threshold:
+                return 1 + self.ordered.index(added[n - 1])
+        return None
 
     def told(self, torn: int) -> Watch:
         """All of it as a result."""
