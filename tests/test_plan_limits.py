@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import syncline_design as sd
 from syncline_design.planning.drives import outcome
-from syncline_design.planning.legs import library, transition
+from syncline_design.planning.legs import MOST_LEG_S, library, transition
 from syncline_design.planning.path import STEP_S, joined, travelled
 from syncline_design.planning.run import plan as planned
 from syncline_design.planning.setup import PlanRequest, Setup
@@ -265,3 +265,28 @@ def test_no_leg_turns_faster_than_the_platform_can(
         assert np.max(rates) <= math.radians(omega_max), leg.name
         level = np.linalg.norm(np.diff(states.velocity_mps[:, :2], axis=0), axis=1) / STEP_S
         assert np.max(level) <= 1.001 * vehicle.acceleration_mps2, leg.name
+
+
+def test_legs_of_years_are_not_made(tmp_path: Path) -> None:
+    """A copter of 1e9 km/s: what it does in place is planned, nothing of 47 TiB is asked for."""
+    spec = spec_with(tmp_path, ("v_max: 9 m/s", "v_max: 1e9 km/s"))
+    (vehicle,) = vehicles(load(spec), ("lidar",))
+    legs = library(vehicle, 0)
+    assert 0 < len(legs) < 8
+    assert max(leg.duration_s for leg in legs) <= MOST_LEG_S
+    done = call(spec, "--reach", "latency(position)=1 s")
+    assert done.exit_code in (0, 1, 2), done.output
+
+
+def test_a_vehicle_without_a_leg_is_refused(tmp_path: Path) -> None:
+    """A car that takes a quarter of an hour to any other speed, and half an hour to turn about."""
+    spec = spec_with(
+        tmp_path,
+        ("motion: multirotor", "motion: ground, minimum_turn_radius: 4000 m"),
+        ("acceleration: 2 m/s^2, area: [250 m, 250 m]", "acceleration: 0.01 m/s^2"),
+    )
+    done = call(spec, "--reach", "latency(position)=1 ms")
+    assert done.exit_code == 2, done.output
+    words = " ".join(done.stderr.split())
+    assert "no leg takes less than 300 s" in words
+    assert "v_max and acceleration" in words

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,11 +40,22 @@ class Leg:
         return self.course.duration_s
 
 
+class LegTooLongError(Exception):
+    """A leg that takes longer than any is driven."""
+
+
 def ramps(vehicle: Vehicle, steps: list[tuple[float, float]], join_mps: float) -> Array:
-    """Speed over time: from the joining speed through (speed, hold [s]) and back to it."""
+    """Speed over time: from the joining speed through (speed, hold [s]) and back to it.
+
+    Raises LegTooLongError before anything of that length is made.
+    """
     slope = 0.6 * vehicle.acceleration_mps2
-    at, parts = join_mps, []
-    for speed, hold_s in [*steps, (join_mps, 0.0)]:
+    at, parts, every = join_mps, [], [*steps, (join_mps, 0.0)]
+    speeds = [join_mps, *(speed for speed, _ in every)]
+    lasts_s = sum(abs(b - a) / slope for a, b in pairwise(speeds)) + sum(s for _, s in every)
+    if not lasts_s <= MOST_LEG_S:
+        raise LegTooLongError
+    for speed, hold_s in every:
         count = max(math.ceil(abs(speed - at) / slope / STEP_S), 1)
         parts.append(at + (speed - at) * np.arange(1, count + 1) / count)
         parts.append(np.full(round(hold_s / STEP_S), speed))
@@ -288,7 +300,10 @@ def library(vehicle: Vehicle, stage: int) -> tuple[Leg, ...]:
 
 def _made(vehicle: Vehicle, stage: int) -> Iterator[Leg]:
     for name, make in MAKERS.items():
-        made = make(vehicle)
+        try:
+            made = make(vehicle)
+        except LegTooLongError:
+            continue
         if made is None:
             continue
         words, course = made

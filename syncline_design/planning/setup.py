@@ -16,6 +16,7 @@ from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
 from syncline_design.planning.beyond import BeyondFirst, beyond_first
 from syncline_design.planning.drives import WholeDrive, World
@@ -28,7 +29,7 @@ from syncline_design.planning.information import (
     noise_rms_m,
     rms_per_unit,
 )
-from syncline_design.planning.legs import Leg
+from syncline_design.planning.legs import MOST_LEG_S, Leg
 from syncline_design.planning.path import joined
 from syncline_design.planning.placing import LegTold
 from syncline_design.planning.search import PlanJudge, noncentrality_of, others_of, pair_ratio
@@ -90,6 +91,7 @@ class Setup:
             raise PlanError(f"--minutes {request.minutes}: expected more than 0 minutes, finite")
         system = pinned_system(case)
         world = _world(case, system, request)
+        _demand_legs(world)
         asked = _asked(system, world.every, request)
         in_force().doing("looking at the legs")
         view = _sampled(world)
@@ -123,6 +125,21 @@ class Setup:
     def reached(self, found: WholeDrive) -> bool:
         """Whether a drive tells all that is asked, whatever it takes."""
         return self.judge.enough(found.after[-1])
+
+
+def _demand_legs(world: World) -> None:
+    """PlanError where no vehicle can drive one leg in the time that a leg may take."""
+    if world.legs:
+        return
+    told = ", ".join(
+        f"{one.stage} from {to_digits(one.join_mps, 3)} to {to_digits(one.fast_mps, 3)} m/s at "
+        f"{to_digits(one.acceleration_mps2, 3)} m/s^2"
+        for one in world.vehicles
+    )
+    raise PlanError(
+        f"no leg takes less than {to_digits(MOST_LEG_S)} s ({told}): state what the vehicle of the "
+        "test drive can do, v_max and acceleration of its platform"
+    )
 
 
 def _world(case: Case, system: System, request: PlanRequest) -> World:

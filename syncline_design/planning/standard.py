@@ -20,7 +20,7 @@ from syncline_design.planning.legs import FULL_RAD, LINE_S, Leg
 from syncline_design.planning.path import STEP_S, CourseCommands
 from syncline_design.planning.placing import QUARTER_RAD, LegTold
 from syncline_design.planning.search import PlanJudge
-from syncline_design.planning.vehicle import Vehicle
+from syncline_design.planning.vehicle import LONGEST_TURN_S, Vehicle
 
 LEAST_TURN_RAD: Final = math.radians(10.0)  # what lines that do not turn may wander
 LINE, SLOW, ABOUT, EIGHT = "line", "slow line", "line, turn about", "eight"
@@ -74,13 +74,15 @@ class Lines:
 
 
 def standard_legs(vehicle: Vehicle, stage: int) -> tuple[Leg, ...]:
-    """Lines and turns at one speed."""
+    """Lines and turns at one speed; none where a turn about at that speed takes hours."""
     fast, low = vehicle.fast_mps, max(vehicle.slowest_mps, 0.4 * vehicle.fast_mps)
     line, slow = _at(fast, LINE_S), _at(low, LINE_S)
     legs = [(LINE, line), (SLOW, slow)]
     speed = _cornering(vehicle)
     rate = vehicle.turn_radps(speed)
     turn, circle = math.pi / rate, FULL_RAD / rate
+    if turn > LONGEST_TURN_S:
+        return ()
     straight = _at(speed, LINE_S).turn
     legs.append((ABOUT, _turned(speed, [straight, _steady(rate, turn)])))
     legs.append((EIGHT, _turned(speed, [_steady(rate, circle), _steady(-rate, circle)])))

@@ -265,7 +265,10 @@ class Telling:
         stage = world.every[wanted[0]].candidate.stage if wanted else 0
         found = []
         vehicle = world.vehicles[stage]
-        for one in line_plans(vehicle, world.looked_at(standard_legs(vehicle, stage))):
+        lines = standard_legs(vehicle, stage)
+        if not lines:
+            return ()
+        for one in line_plans(vehicle, world.looked_at(lines)):
             in_force().check()
             legs = legs_needed(self.setup.judge, one)
             information = one.told_in(duration_s(drive))
