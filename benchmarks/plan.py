@@ -195,7 +195,7 @@ def one_plan(number: int, folder: Path) -> dict[str, object]:
     found |= {"diagnose_cpu_s": time.process_time() - planned, "rows": len(scenario.stamps_s),
               "verdict": answer.verdict, "truth": [str(one) for one in truth], "findings": [
                   (f.effect, f.sensor, f.kind, f.material, {
-                      k: (float(v.value), v.standard_uncertainty) for k, v in f.parameters.items()},
+                      k: (v.value, v.standard_uncertainty) for k, v in f.parameters.items()},
                    [(a.effect, a.sensor) for a in f.aliases])
                   for f in answer.findings]}  # fmt: skip
     return found | scored(run, truth, answer, second if separate else None)
