@@ -30,9 +30,9 @@ from syncline_design.planning.information import (
     unknowns,
     with_shift,
 )
-from syncline_design.planning.legs import Leg, library, transition
+from syncline_design.planning.legs import QUARTER_RAD, Leg, library, transition
 from syncline_design.planning.path import STEP_S, CourseCommands, PathStates, joined, travelled
-from syncline_design.planning.placing import QUARTER_RAD, LegTold, Room, Swept, arranged
+from syncline_design.planning.placing import LegTold, Room, Swept, arranged
 from syncline_design.planning.planned_log import (
     Drive,
     apart,

@@ -181,7 +181,7 @@ def _swinging_circle(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if high <= 1.1 * low:
         return None
     ahead = ramps(v, [(high, 0.5), (low, 0.5)] * 3, v.join_mps)
-    tightest = max(high / v.turn_radps(high), v.turn_radius_m)
+    tightest = high / v.turn_radps(high)
     length = float(np.sum(np.abs(ahead))) * STEP_S
     quarters = min(math.floor(length / tightest / QUARTER_RAD), 4)
     if quarters < 1:

@@ -12,9 +12,8 @@ from typing import Final
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.planning.legs import Leg
+from syncline_design.planning.legs import QUARTER_RAD, Leg
 
-QUARTER_RAD: Final = 0.5 * math.pi
 ABOUT: Final = 2  # quarters of a turn about
 AREA_SHARE: Final = 0.9  # of the area that a drive may take: nobody drives to the very edge
 Place = tuple[float, float]

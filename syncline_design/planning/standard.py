@@ -16,9 +16,9 @@ import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.planning.legs import FULL_RAD, LINE_S, Leg
+from syncline_design.planning.legs import FULL_RAD, LINE_S, QUARTER_RAD, Leg
 from syncline_design.planning.path import STEP_S, CourseCommands
-from syncline_design.planning.placing import QUARTER_RAD, LegTold
+from syncline_design.planning.placing import LegTold
 from syncline_design.planning.search import PlanJudge
 from syncline_design.planning.vehicle import LONGEST_TURN_S, Vehicle
 
