@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.coarse_rhythm import counted
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.stream import Examined, examined
-from syncline_design.logs.readers.stream import Stamps, Stream
+from syncline_design.auditing.stream import Examined
 from syncline_design.machine.random_numbers import generator
+from tests.stamped_streams import of
 
 Array = NDArray[np.float64]
-EPOCH_NS = 1_779_000_000 * 10**9
 LENGTH_S, TICK_S, GRID_S = 75.0, 0.016, 0.1
 GAP_S = 5.3
 
@@ -44,11 +43,6 @@ def on_a_grid(when: Array, seed: int) -> tuple[Array, Array]:
     rng = generator((seed, when.size))
     late = rng.gamma(2.0, 1e-3, when.size) + 5e-3
     return np.floor(when / GRID_S) * GRID_S, np.maximum.accumulate(when + late)
-
-
-def of(stamp: Array, receive: Array) -> Examined:
-    stamps = (EPOCH_NS + np.rint(x * 1e9).astype(np.int64) for x in (stamp, receive))
-    return examined(Stream("x", (), stamp.size, Stamps("header.stamp", "log time", *stamps)))
 
 
 def named(one: Examined) -> dict[str, StampFault]:

@@ -6,16 +6,9 @@ import numpy as np
 import pytest
 
 from syncline_design.auditing.series import Array
-from syncline_design.auditing.stream import Examined, examined
-from syncline_design.logs.readers.stream import Stamps, Stream
+from syncline_design.auditing.stream import Examined
 from syncline_design.machine.random_numbers import generator
-
-EPOCH_NS = 1_790_000_000 * 10**9
-
-
-def of(stamp: Array, receive: Array) -> Examined:
-    stamps = (EPOCH_NS + np.rint(x * 1e9).astype(np.int64) for x in (stamp, receive))
-    return examined(Stream("x", (), stamp.size, Stamps("header.stamp", "log time", *stamps)))
+from tests.stamped_streams import of
 
 
 def came(when: Array, rng: np.random.Generator) -> Array:

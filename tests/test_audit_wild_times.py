@@ -6,18 +6,12 @@ import numpy as np
 import pytest
 
 from syncline_design.auditing.series import Array
-from syncline_design.auditing.stream import Examined, examined
-from syncline_design.logs.readers.stream import Stamps, Stream
+from syncline_design.auditing.stream import Examined
 from syncline_design.machine.random_numbers import generator
+from tests.stamped_streams import of
 
-EPOCH_NS = 1_790_000_000 * 10**9
 YEARS_S = 12 * 365.25 * 86_400.0
 SIZES = [0.1, 0.3, 0.7, 5.3, 100.0, 3600.3, 30 * 86_400.0, YEARS_S]
-
-
-def of(stamp: Array, receive: Array) -> Examined:
-    stamps = (EPOCH_NS + np.rint(x * 1e9).astype(np.int64) for x in (stamp, receive))
-    return examined(Stream("x", (), stamp.size, Stamps("header.stamp", "log time", *stamps)))
 
 
 def sensor(seed: int, rate: float = 50.0) -> tuple[Array, Array, np.random.Generator]:
