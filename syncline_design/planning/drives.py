@@ -56,8 +56,8 @@ class World:
     rate_hz: rows a second that the log has.  measured: noise that a diagnosis found.  surveyed:
     targets that are there already (m, 3) [m]; None: they are put where the drive needs them.
     beyond: pairs that are judged beyond first order.  most_hz: rows a second that are computed.
-    of: the unknowns, where they are those of another world; None: those that a drive of its own
-    shows.
+    same_unknowns: those of another world, where they are to be the same; None: those that a drive
+    of its own shows.
     """
 
     system: System
@@ -67,7 +67,7 @@ class World:
     surveyed: Array | None = None
     beyond: tuple[BeyondFirst, ...] = ()
     most_hz: float = COMPUTED_HZ
-    of: tuple[Unknown, ...] | None = None
+    same_unknowns: tuple[Unknown, ...] | None = None
 
     @property
     def computed_hz(self) -> float:
@@ -79,7 +79,7 @@ class World:
         Its unknowns stay: which ones a log shows hangs on its rows a second.
         """
         most_hz = min(self.most_hz, MOST_ROWS / max(duration_s, 1.0))
-        return replace(self, most_hz=most_hz, of=self.every)
+        return replace(self, most_hz=most_hz, same_unknowns=self.every)
 
     def driven(self, courses: Sequence[CourseCommands]) -> Drive:
         """A drive of courses, one a stage, all of one length."""
@@ -137,8 +137,8 @@ class World:
     @cached_property
     def every(self) -> tuple[Unknown, ...]:
         """All unknowns, as a drive of one turning leg shows them."""
-        if self.of is not None:
-            return self.of
+        if self.same_unknowns is not None:
+            return self.same_unknowns
         turning = next((g for g in self.legs if g.name == "figure eight"), self.legs[0])
         return unknowns(self.view(self.driven(self.courses_of(turning.stage, turning.course))))
 

@@ -97,7 +97,7 @@ class Setup:
         view = _sampled(world)
         goal = goal_of(system, world.every, asked, *_sizes(world, view))
         goal, beyond = _beyond_first(view, world.every, goal)
-        world = replace(world, beyond=beyond, of=world.every)
+        world = replace(world, beyond=beyond, same_unknowns=world.every)
         prior = np.array([one.prior for one in world.every])
         told = world.looked_at(_legs_of(world, goal))
         library = np.sum([t.at(h, SECONDS * h) for t in told for h in range(4)], axis=0)
