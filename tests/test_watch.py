@@ -432,7 +432,7 @@ def test_runs_are_ordered_by_date_where_all_have_one(spec: Path, tmp_path: Path)
 
 
 def test_a_change_that_was_undone_is_told_as_both(spec: Path, tmp_path: Path) -> None:
-    """Ten bounds in runs 5 and 6 of 12 alone: since 5 so much, and since 7 as much less."""
+    """Fourteen bounds in runs 5 and 6 of 12 alone: since 5 so much, and since 7 as much less."""
     base, moved = 20.0 * BOUND, np.array([14.0, 0, 0, 0, 0]) * BOUND
     for seed in range(4):
         rng = np.random.default_rng(100 + seed)

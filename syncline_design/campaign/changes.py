@@ -94,21 +94,18 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class Differing:
-    """An effect that differs from run to run: how clearly [standard deviations of Q], and the
-    covariance by which it does beyond noise.
-
-    named: the commonest that differs as clearly.
-    """
+    """An effect that differs from run to run, and the covariance (p, p) by which it does beyond
+    noise; named, named_covariance: the same of the commonest that differs as clearly."""
 
     term: Term
-    clear: float
     covariance: Array
-    named: Differing | None = None
+    named: Term
+    named_covariance: Array
 
     @property
     def spread(self) -> Array:
-        """Standard deviation by parameter."""
-        found: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        """Standard deviation of the named effect by parameter, (p,)."""
+        found: Array = np.sqrt(np.maximum(np.diag(self.named_covariance), 0.0))
         return found
 
 
@@ -333,9 +330,8 @@ class Changes:
         return self._latest[look]
 
     def differing(self, look: int) -> tuple[Differing, ...]:
-        """Effects that clearly differ from run to run, of the first `look` runs, by the names of
-        the commonest that do as clearly."""
-        return tuple(one.named or one for one in self._runs(look).freed)
+        """Effects that clearly differ from run to run, of the first `look` runs."""
+        return self._runs(look).freed
 
     def _compared(self, look: int, normal: Array, score: Array) -> Runs:
         """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
@@ -356,26 +352,22 @@ class Changes:
     def _scattering(self, runs: Runs) -> Differing | None:
         """The effect that differs most clearly from run to run; None where noise would do.  One
         change is none: runs are parted at any."""
-        found = [
-            self._differing(runs, g, k, float(least), float(free))
-            for g, scatter in zip(self.groups, runs.scatters, strict=True)
-            for k, (least, free) in enumerate(
-                zip(scatter.square.min(axis=0), scatter.free.min(axis=0), strict=True)
-            )
-        ]
-        best = max(found, key=lambda one: one.clear)
-        if not best.clear > SCATTERED:
+        clear, excess = np.zeros(len(self.terms)), np.zeros(len(self.terms))
+        for g, scatter in zip(self.groups, runs.scatters, strict=True):
+            least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
+            clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
+            excess[g.terms] = least / np.where(free > 0.0, free, np.inf) - 1.0
+        best = int(np.argmax(clear))
+        if not clear[best] > SCATTERED:
             return None
-        alike = [one for one in found if one.clear > best.clear - AS_CLEAR]
-        return replace(best, named=min(alike, key=lambda one: commonness(one.term.label)))
-
-    def _differing(self, runs: Runs, group: Group, k: int, least: float, free: float) -> Differing:
-        own = group.index[k]
-        usual = inverted(runs.normal.mean(axis=0)[np.ix_(own, own)])
+        alike = np.flatnonzero(clear > clear[best] - AS_CLEAR)
+        named = min(alike, key=lambda k: commonness(self.terms[k].label))
+        usual = runs.normal.mean(axis=0)
         return Differing(
-            self.terms[int(group.terms[k])],
-            (least - free) / math.sqrt(2.0 * max(free, 1.0)),
-            (least / free - 1.0) * usual if free > 0.0 else 0.0 * usual,
+            self.terms[best],
+            excess[best] * _own_covariance(usual, self.terms[best]),
+            self.terms[named],
+            excess[named] * _own_covariance(usual, self.terms[named]),
         )
 
     def _total(self, look: int, normal: Array, score: Array) -> Array:
@@ -398,6 +390,11 @@ class Changes:
         found = Changes(pool)
         found.__dict__["within"] = self.within  # the scatter inside runs is what it was
         return found
+
+
+def _own_covariance(normal: Array, term: Term) -> Array:
+    """Covariance (p, p) of one effect alone, by an information matrix."""
+    return inverted(normal[np.ix_(term.index, term.index)])
 
 
 def _pseudo_inverse(total: Array) -> Array:

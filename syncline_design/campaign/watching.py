@@ -242,6 +242,9 @@ class Watching:
         if self.doubted is not None:
             return None
         added = sorted(self.ordered, key=lambda entry: entry.number)
+        begun = [entry.run.first_s for entry in added]
+        if begun == sorted(begun):  # nothing came in late: the course is what the looks found
+            return None
         for n in range(2, len(added)):
             look = self.stored.looks.get(self._keys(tuple(by_date(tuple(added[:n]))))[-1])
             if look is not None and look.log_evidence >= self.threshold:
@@ -388,7 +391,7 @@ class Watching:
         """Effects that have another value in every run: no change, and nothing to count on."""
         told = {one.change.term.label for one in self.seen}
         for found in self.changes.differing(len(self.ordered)):
-            term = found.term
+            term = found.named
             if term.label in told:
                 continue
             sizes = " and ".join(
