@@ -555,11 +555,13 @@ def test_what_is_refused(spec: Path, tmp_path: Path) -> None:
         ((store, "--accept"), "no runs to accept"),
         ((spec, spec), "spec.yaml:1:1"),
         ((tmp_path, spec), "cannot read the store"),
+        ((tmp_path / "mistyped" / "store.jsonl", spec), "there is no folder"),
     ):
         found = watch(*arguments)
         assert found.exit_code == 2, found.output
         assert words in found.output + found.stderr
     assert not store.exists()
+    assert not (tmp_path / "mistyped").exists()
 
 
 def at_calendar_times(path: Path, begun: datetime) -> None:
@@ -589,6 +591,7 @@ def test_a_real_run_end_to_end(spec: Path, tmp_path: Path) -> None:
     for k in range(2):
         found = watch(store, own, tmp_path / f"run{k}.csv")
         assert found.exit_code == 0, found.output + found.stderr
+        assert ("A new store, begun with this run" in found.output) == (k == 0)
     kinds = [json.loads(line)["body"]["kind"] for line in store.read_text("utf-8").splitlines()]
     assert kinds == ["store", "run", "looks", "run", "looks"]
     before = store.read_bytes()

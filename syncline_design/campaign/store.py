@@ -88,6 +88,10 @@ def read_store(path: Path, known: Stored | None = None) -> Stored | None:
     try:
         content = read_plain(path, MOST_BYTES)
     except FileNotFoundError:
+        if not path.parent.is_dir():  # a mistyped place would begin a history of its own, unheard
+            raise refused(path, f"there is no folder {path.parent}",
+                          "the store's path, or that of a new one in a folder that is there",
+                          ) from None  # fmt: skip
         return None
     except (OSError, UnsuitableError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -22,7 +22,6 @@ def append_line(path: Path, line_after: Callable[[bytes], bytes]) -> None:
     as it was.
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
     except OSError as error:
         raise explained(path, error) from None

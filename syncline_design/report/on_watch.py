@@ -104,6 +104,8 @@ def _sentences(found: Watch) -> Iterator[Inline]:
             " makes a new baseline: after a repair, or where the change is meant to stay.",
         )
     elif _looks(found) < FEWEST_RUNS:
+        if all(run.new for run in found.runs):
+            yield ("A new store, begun with this run: ", code(found.store), ".")
         yield (
             f"Fewer than {FEWEST_RUNS} runs do not say what differs from run to run anyway, so "
             "that even a large change may not ring yet. What each says alone is in the table of "
