@@ -143,15 +143,21 @@ def test_a_map_writes_prices_out_where_they_fit_and_else_says_thousand(
     assert (max(map(len, out)) * 5.8 <= ACROSS / across) == whole
 
 
-def test_values_of_very_many_points_are_the_first_of_them_and_say_so() -> None:
+def test_values_of_very_many_points_are_both_ends_of_them_and_say_so() -> None:
     many = [FrontMark(1e3 + k, 1.0 / (1 + k), False, f"design {k}") for k in range(1234)]
     made = page(Chart("front", lambda: pareto_front(many, "EUR", None, None), ""))
     shown = made.partition('class="values"')[2].partition("</details>")[0]
     assert len(re.findall(r"<tr>", shown)) == 1 + MOST_VALUES
     plain = shown.replace("\u00a0", " ")
-    assert f"The first {MOST_VALUES} of 1 234" in plain
-    assert "design 199<" in plain
-    assert "design 200<" not in plain
+    end = MOST_VALUES // 2
+    assert f"The first and the last {end} of 1 234" in plain
+    for design, there in (
+        (end - 1, True),
+        (end, False),
+        (1234 - end - 1, False),
+        (1234 - end, True),
+    ):
+        assert (f"design {design}<" in plain) is there
 
 
 def test_a_second_output_without_its_option_is_told_so(tmp_path: Path) -> None:

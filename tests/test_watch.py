@@ -1,11 +1,7 @@
-"""A system watched over time: the evidence, the alarm and its date, the store, the page.
-
-Oracles: Bayes factors by the dense normal density of scipy, and counting.
-"""
+"""A system watched over time: the alarm and its date, the store, what is refused."""
 
 from __future__ import annotations
 
-import itertools
 import json
 import re
 from dataclasses import replace
@@ -14,247 +10,35 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from jsonschema import Draft202012Validator
-from scipy.stats import multivariate_normal
-from typer.testing import CliRunner, Result
 
 import syncline_design as sd
-from browsing import flaws_of
-from html_page import Page
-from syncline_design.campaign.changes import REACH, Changes, weight_of
-from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
+from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.kept import NamedAlone, date_of
 from syncline_design.campaign.pool import pool_of
-from syncline_design.campaign.scatter import APART, DIFFERING, log_odds_apart
 from syncline_design.campaign.store import Stored, add_looks, add_run, demand_new, read_store
 from syncline_design.campaign.watch_result import Watch
 from syncline_design.campaign.watching import Watching, WatchRequest
-from syncline_design.cli.app import app
-from syncline_design.diagnosis.sufficient import Less, Sufficient
 from syncline_design.diagnosis.system import pinned_system
-from syncline_design.effects import registry
-from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import BadInput, load
 from tests.world import make_log, scenario
-
-LABELS = (
-    ("latency", "position", 0, "latency_s"),
-    ("range_bias", "ranging", 0, "bias_m"),
-    ("datum_offset", "target", 0, "north_m"),
-    ("datum_offset", "target", 0, "east_m"),
-    ("datum_offset", "target", 0, "down_m"),
+from watched_series import (
+    BOUND,
+    DAY,
+    FIRST,
+    LABELS,
+    car_spec,
+    kept,
+    run_of,
+    series,
+    statistics,
+    told,
+    watch,
 )
-UNITS = np.array([1e-3, 1e-2, 1e-2, 1e-2, 1e-2])
-ROWS, BLOCKS, DAY = 64, 8, 86_400.0
-BOUND = UNITS / np.sqrt(ROWS)  # standard deviation of a parameter by one run, roughly
-FIRST = 1.79e9
-
-
-def statistics(rng: np.random.Generator, values: np.ndarray, alike: float = 0.0) -> Sufficient:
-    """Of a linear log with unit noise; alike: cosine of latency and the datum's north."""
-    columns = rng.standard_normal((ROWS, len(LABELS)))
-    columns[:, 2] = alike * columns[:, 0] + np.sqrt(1.0 - alike**2) * columns[:, 2]
-    columns /= UNITS
-    whole = np.column_stack([columns, columns @ values + rng.standard_normal(ROWS)])
-    total = whole.T @ whole
-    less = np.array([total - part.T @ part for part in np.split(whole, BLOCKS)])
-    return Sufficient(
-        LABELS, total[:-1, :-1], total[:-1, -1], float(total[-1, -1]), total[:-1, :-1] / ROWS,
-        (Less(less[:, :-1, :-1], less[:, :-1, -1], less[:, -1, -1]),),
-    )  # fmt: skip
-
-
-def run_of(
-    found: Sufficient, day: int, date: bool = True, named: tuple[NamedAlone, ...] = ()
-) -> Run:
-    first = (FIRST if date else 0.0) + DAY * day
-    return Run(
-        (f"day{day}.csv",), f"{day:064d}", "georeference", first, date_of(first), 60.0, ROWS, ROWS,
-        {}, "agrees", 0.0, False, 0.05, {"car/position": 1.0}, named, "0", **statistics_of(found),
-    )  # fmt: skip
-
-
-def series(seed: int, runs: int, change: np.ndarray, since: int) -> list[Sufficient]:
-    rng = np.random.default_rng(seed)
-    base = 20.0 * BOUND * rng.standard_normal(len(LABELS))  # of the build, whatever it is
-    return [statistics(rng, base + (change if k >= since else 0.0)) for k in range(runs)]
-
-
-def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
-    """Scores of all runs together, before and after the change is marginalised, over those where
-    one effect after the other differs from run to run."""
-    found = series(3, 6, np.array([4.0, 0, 0, 0, 0]) * BOUND, 4)
-    changes = Changes(pool_of(found, range(6)))
-    p = len(LABELS)
-    normal = np.array([f.normal for f in found])
-    # estimates of single runs are normal about their values with the inverse information
-    values = np.concatenate([np.linalg.solve(f.normal, f.score) for f in found])
-    cover = np.zeros((6 * p, 6 * p))
-    for k in range(6):
-        cover[k * p : (k + 1) * p, k * p : (k + 1) * p] = np.linalg.inv(normal[k])
-    spread = np.full(p, 100.0) * BOUND  # narrow enough for dense matrices
-    place = [LABELS.index(label) for label in changes.pool.labels]
-    changes.__dict__["prior"] = spread[place] ** -2.0
-    changes.__dict__["within"] = np.ones((6, len(changes.terms)))
-    unit = np.tile(BOUND, 6)
-    common = np.tile(np.diag(spread), (6, 1))
-    null = cover + common @ common.T
-
-    def density(covariance: np.ndarray) -> float:
-        scaled = covariance / unit[:, None] / unit
-        return float(multivariate_normal(np.zeros(6 * p), scaled).logpdf(values / unit))
-
-    base = density(null)
-    total, table = changes.log_evidence(6)
-    whole = [np.log(1.0 - sum(weight_of(k + 1) for k in range(1, 6)))]
-    for c, term in enumerate(changes.terms):
-        own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
-        size = REACH * np.linalg.cholesky(np.linalg.inv(normal.mean(0)[np.ix_(own, own)]))
-        for k in range(1, 6):
-            column = np.zeros((6 * p, len(own)))
-            for r in range(k, 6):
-                column[[r * p + i for i in own]] = size
-            other = density(null + column @ column.T)
-            expected = np.log(weight_of(k + 1)) + changes.log_weights[c] + other - base
-            assert table[k - 1, c] == pytest.approx(expected, abs=1e-3)
-            whole.append(table[k - 1, c])
-    apart = [0.0]
-    for term in changes.terms:
-        own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
-        usual = np.linalg.inv(normal.mean(0)[np.ix_(own, own)])
-        for bounds, odds in zip(APART, log_odds_apart(len(changes.terms)), strict=True):
-            other = null.copy()
-            for r in range(6):
-                at = [r * p + i for i in own]
-                other[np.ix_(at, at)] += bounds**2 * usual
-            apart.append(odds + density(other) - base)
-    assert changes.doubt(6) == pytest.approx(float(np.logaddexp.reduce(apart)), abs=1e-3)
-    assert changes.doubt(6) > 1.0  # the oracle is asked where there is something to say
-    assert total == pytest.approx(float(np.logaddexp.reduce(whole)) - changes.doubt(6), abs=1e-9)
-
-
-def test_odds_of_differing_are_shared_by_effects_and_sizes() -> None:
-    odds = np.exp(log_odds_apart(40))
-    assert 40.0 * odds.sum() == pytest.approx(DIFFERING)
-    assert odds[0] / odds[1] == pytest.approx((APART[1] / APART[0]) ** 2)
-
-
-def test_scatter_of_a_rare_effect_is_no_change_of_a_common_one() -> None:
-    """Two that move runs almost alike, of which the rarer differs from run to run by two bounds.
-
-    Of 40 series of 24 looks, 1.2 would ring at 3 %, more than 5 with a chance of 0.5 %.
-    """
-    rare = registry()["packetised_timestamps"].slopes()[0].name
-    labels = (LABELS[0], ("packetised_timestamps", "position", 0, rare))
-    rung = 0
-    for seed in range(40):
-        rng = np.random.default_rng([41, seed])
-        runs = []
-        for _ in range(25):
-            size = 64.0 * np.exp(rng.normal(0.0, 1.0))  # how much a day's drive tells
-            root = np.sqrt(size) * np.array([[1.0, 0.98], [0.0, 0.2]])
-            value = np.array([0.0, 2.0 * rng.standard_normal() / 8.0])
-            score = root.T @ (root @ value + rng.standard_normal(2))
-            runs.append(Sufficient(labels, root.T @ root, score, 0.0, np.eye(2), ()))
-        changes = Changes(pool_of(runs, range(25)))
-        rung += any(changes.log_evidence(n)[0] >= np.log(20.0) for n in range(2, 26))
-    assert rung <= 5
-
-
-def test_one_day_far_off_rings_where_its_runs_agreed_and_not_where_they_do_not() -> None:
-    """7.5 bounds off with run 7 of a series: e-value above 20 only where runs agreed before.
-
-    In exact figures, of runs one bound apart in the mean square, and of runs that scatter three
-    times as far; beside the latency the runs show every other effect that moves the mean as none.
-    """
-    calm = np.array([1.1, -0.9, 0.2, -1.3, 1.2, -0.3])
-    effects = [e for e in registry().values() if e.sensitivity is not None and e.name != "latency"]
-    every = [(e.name, e.sensors[0], 0, p.name) for e in effects for p in e.slopes()]
-    labels = (LABELS[0], *every)
-    first = np.eye(len(labels))[0]
-
-    unit = np.eye(first.size)
-
-    def evidence(before: np.ndarray, last: float) -> float:
-        runs = [
-            Sufficient(labels, np.eye(first.size) * 64e6, 64e6 * v * first, 0.0, unit, ())
-            for v in np.array([*before, last]) * 1e-3 / 8.0
-        ]
-        return Changes(pool_of(runs, range(7))).log_evidence(7)[0]
-
-    assert evidence(calm, 0.0) < 0.0
-    assert evidence(calm, 7.5) > np.log(20.0)
-    assert evidence(3.0 * calm, 7.5) < np.log(20.0)
-
-
-def test_the_evidence_of_a_large_change_does_not_end() -> None:
-    """20 bounds from the eleventh run on: every run says it again, however much was said before.
-
-    log B is beyond the logarithm of the largest double (709) by the runs after the eighteenth; what
-    differs from run to run is held against all of it.
-    """
-    change = np.array([20.0, 0, 0, 0, 0]) * BOUND
-    changes = Changes(pool_of(series(4, 24, change, 10), range(24)))
-    course = [changes.log_evidence(n)[0] for n in range(11, 25)]
-    assert all(later > before > 0.0 for before, later in itertools.pairwise(course))
-    place = [term.effect.name for term in changes.terms].index("latency")
-    assert changes.change(24, 10, place).log_factor > 1000.0
-
-
-def test_weights_of_all_runs_and_effects_share_the_false_alarms() -> None:
-    assert sum(weight_of(k) for k in range(2, 200_000)) == pytest.approx(1.0, abs=0.01)
-    assert weight_of(2) > weight_of(3) > weight_of(100) > 0.001
-    changes = Changes(pool_of(series(1, 2, 0.0 * BOUND, 9), range(2)))
-    share = {t.effect.name: np.exp(w) for t, w in zip(changes.terms, changes.log_weights,
-                                                       strict=True)}  # fmt: skip
-    assert sum(share.values()) == pytest.approx(1.0)
-    assert share["latency"] > share["range_bias"] > share["datum_offset"]
-
-
-def test_false_alarms_over_many_looks_and_the_delay() -> None:
-    """60 quiet series of 25 looks at 5 %: more than 8 ring in 1 % of choices of seeds.
-
-    A change of six bounds of one run is heard within two runs in most series.
-    """
-    rung = 0
-    for seed in range(60):
-        changes = Changes(pool_of(series(seed, 26, 0.0 * BOUND, 99), range(26)))
-        rung += any(changes.log_evidence(n)[0] >= np.log(20.0) for n in range(2, 27))
-    assert rung <= 8
-    delays = []
-    for seed in range(20):
-        change = np.array([6.0, 0, 0, 0, 0]) * BOUND
-        changes = Changes(pool_of(series(500 + seed, 16, change, 10), range(16)))
-        looks = [n for n in range(2, 17) if changes.log_evidence(n)[0] >= np.log(20.0)]
-        delays.append(looks[0] - 11 if looks else 99)
-    assert float(np.median(delays)) <= 1.0
 
 
 @pytest.fixture(scope="module")
 def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("watch") / "spec.yaml"
-    log = make_log(scenario("car_stops", 4, 20.0, 5.0), ())
-    path.write_text(log.spec_yaml(), encoding="utf-8")
-    return path
-
-
-def kept(spec: Path, folder: Path, runs: list[Run]) -> Path:
-    store, case = folder / "store.jsonl", load(spec)
-    for run in runs:
-        add_run(store, "car", pinned_system(case), run)
-    return store
-
-
-def watch(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(app, ["watch", *map(str, arguments)])
-
-
-def told(spec: Path, store: Path, folder: Path, code: int) -> dict:
-    out, page = folder / "watch.json", folder / "watch.html"
-    found = watch(store, spec, "-o", f"json:{out}", "-o", f"html:{page}")
-    assert found.exit_code == code, found.output
-    document = dict(json.loads(out.read_text("utf-8")))
-    Draft202012Validator(result_schema("watch")).validate(document)
-    return document
+    return car_spec(tmp_path_factory.mktemp("watch") / "spec.yaml")
 
 
 def test_ten_days_ring_on_the_day_of_the_change(spec: Path, tmp_path: Path) -> None:
@@ -366,39 +150,6 @@ def test_a_look_that_its_runs_do_not_bear_out_is_not_believed(spec: Path, tmp_pa
 
 
 @pytest.mark.browser
-def test_its_page_is_sound(browser: object, spec: Path, tmp_path: Path) -> None:
-    change = np.array([9.0, 0, 0, 0, 0]) * BOUND
-    runs = [run_of(one, day) for day, one in enumerate(series(11, 5, change, 3))]
-    path = tmp_path / "watch.html"
-    watch(kept(spec, tmp_path, runs), spec, "-o", f"html:{path}")
-    page = path.read_text("utf-8")
-    assert "fig-courses-2" in page
-    for label in ("syncline-design", "Spec, SHA-256", "Catalogs, SHA-256"):
-        assert label in Page(page).text
-    assert flaws_of(browser, path) == []
-
-
-def test_the_courses_are_not_shifted_by_what_changed(spec: Path, tmp_path: Path) -> None:
-    """A build with a datum that is off, of which the latency is moved by 30 bounds with run 7.
-
-    Where the mean change is taken for the build's own, the datum's north, which moves runs nearly
-    alike, is off by ten standard deviations on every day.  Of 50 values one is beyond 4.2 of them
-    with a chance of 0.13 %.
-    """
-    rng, change = np.random.default_rng(51), 30.0 * BOUND[0]
-    build = np.array([0, 0, 25.0, 0, -40.0]) * BOUND
-    moved = build + np.array([change, 0, 0, 0, 0])
-    found = [statistics(rng, moved if day >= 6 else build, 0.9) for day in range(10)]
-    store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found)])
-    runs = told(spec, store, tmp_path, 1)["runs"]
-    for (effect, _, _, name), true in zip(LABELS, build, strict=True):
-        every = [v for run in runs for v in run["values"] if v["parameter"] == name]
-        values, spread = (np.array([v[k] for v in every])
-                          for k in ("value", "standard_uncertainty"))  # fmt: skip
-        expected = true + np.where((np.arange(10) >= 6) & (effect == "latency"), change, 0.0)
-        assert np.max(np.abs(values - expected) / spread) < 4.2, name
-
-
 def test_an_accepted_change_is_the_new_baseline(spec: Path, tmp_path: Path) -> None:
     found = series(12, 12, np.array([9.0, 0, 0, 0, 0]) * BOUND, 4)
     store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found[:8])])

@@ -57,7 +57,7 @@
     var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 60;
     if (phone.matches && few && cut(frame)) { frame.classList.add("cards"); }
     frame.classList.toggle("more", cut(frame));
-    frame.classList.toggle("down", frame.matches(".inner") && frame.scrollHeight > frame.clientHeight + 1);
+    frame.classList.toggle("down", frame.matches(".inner, .long") && frame.scrollHeight > frame.clientHeight + 1);
   }
   var frames = Array.prototype.slice.call(document.querySelectorAll(".scroll, .inner"));
   if (window.ResizeObserver) {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from statistics import median
 from typing import TYPE_CHECKING, Final
 
 from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_text
@@ -28,20 +29,22 @@ MOST: Final = 1e12
 
 
 def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
-    """E-values over the runs in the order in which they are compared, logarithmic."""
+    """E-values over the runs in the order in which they are compared, logarithmic; of those beyond
+    MOST the place is that of MOST, the words are their own."""
     numbers_of, places = [r.run for r in runs], range(len(runs))
     values = [min(max(r.e_value or 0.0, 1e-3), MOST) for r in runs]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         axes.plot(places, values, marker="o", markersize=3.5, color=SERIES[0])
-        for place, run, value in zip(places, numbers_of, values, strict=True):
-            tell(axes, place, value, [("Run", str(run)), ("e-value", numbers.number(value, 3))])
+        for place, run, value in zip(places, runs, values, strict=True):
+            told = e_value_text(run.e_value or 0.0)
+            tell(axes, place, value, [("Run", str(run.run)), ("e-value", told)])
         axes.axhline(threshold, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
         low, high = 0.7 * min(values), 2.0 * max(*values, threshold)
         axes.set_ylim(low, high)
-        scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), lambda v: numbers.number(v, 6))
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), _e_value_tick)
         _run_ticks(axes, numbers_of)
         axes.set_xlabel("run")
         axes.set_ylabel("e-value")
@@ -52,6 +55,11 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
         f"{numbers.number(threshold, 3)} on"
     )
     return draw("fig-evidence", "Evidence for a change", spoken, (WIDTH, 220.0), build)
+
+
+def _e_value_tick(value: float) -> str:
+    """`0.1`, `20`, `1000`, and from there on powers of ten."""
+    return numbers.number(value, 6) if value <= 1e3 else scales.power_of_ten(value)
 
 
 def courses(
@@ -81,12 +89,15 @@ def _panel(
     shown = [(place, v) for place, v in points if v.interval95 is not None]
     scale, unit = _scale([v.interval95 or () for _, v in shown], key[3])
     colour = BAD if since else SERIES[0]
+    decimals = _decimals([(v.interval95[1] - v.interval95[0]) / scale for _, v in shown
+                          if v.interval95 is not None])  # fmt: skip
     for place, v in shown:
         low, high = v.interval95 or (0.0, 0.0)
+        value, *ends = (numbers.places(x / scale, decimals) for x in (v.value, low, high))
         tell(axes, place, v.value / scale, [
             ("Run", str(runs[place].run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
-            ("Value", f"{numbers.number(v.value / scale, 4)} {unit}"),
-            ("95 % interval", _interval(low / scale, high / scale, unit)),
+            ("Value", f"{value} {unit}".strip()),
+            ("95 % interval", " to ".join(f"{end} {unit}".strip() for end in ends)),
         ])  # fmt: skip
         axes.plot([place, place], [low / scale, high / scale], color=colour, linewidth=1.2)
     axes.plot([place for place, _ in shown], [v.value / scale for _, v in shown], "o", color=colour,
@@ -103,6 +114,12 @@ def _panel(
     axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
     _run_ticks(axes, [r.run for r in runs])
     axes.margins(x=0.06)
+
+
+def _decimals(widths: Sequence[float]) -> int:
+    """Places at which half of the middle width of these intervals has two digits."""
+    half = 0.5 * median(widths) if widths else 0.0
+    return max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 3
 
 
 def _interval(low: float, high: float, unit: str) -> str:
@@ -192,7 +209,16 @@ def _whole_ticks(axes: Axes, runs: Sequence[int]) -> None:
 
 
 def _run_ticks(axes: Axes, runs: Sequence[int]) -> None:
-    """Numbers of runs at their places."""
-    places = range(0, len(runs), max(1, math.ceil(len(runs) / 6)))
-    axes.set_xticks(list(places))
+    """Numbers of runs: of the first and of some six round ones, or at round places of runs that
+    are out of their order."""
+    step = _round_step(len(runs) / 6)
+    counted = runs if list(runs) == sorted(runs) else range(1, len(runs) + 1)
+    places = [k for k, number in enumerate(counted) if k == 0 or number % step == 0]
+    axes.set_xticks(places)
     axes.set_xticklabels([numbers.count(runs[place]) for place in places])
+
+
+def _round_step(least: float) -> int:
+    """1, 2 or 5 times a power of ten, not below so much."""
+    power = 10 ** max(0, math.floor(math.log10(least))) if least > 1.0 else 1
+    return next(m * power for m in (1, 2, 5, 10) if m * power >= least)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
 
 _TEMPLATES: Final = "syncline_design.templates"
-MOST_VALUES: Final = 200  # rows of the table below a figure; of more the first
+MOST_VALUES: Final = 200  # rows of the table below a figure; of more both ends
 _LINE: Final = 30  # characters of a column that holds sentences
 _TABLET: Final = 92  # characters in a line of a table there
 _PHONE: Final = 48
@@ -150,11 +150,13 @@ def _values(figure: InlineChart, caption: str) -> Table | None:
     """The same as a table, as far as anyone reads; None of a figure that says nothing."""
     if not figure.told:
         return None
-    told, every = figure.told[:MOST_VALUES], numbers.count(len(figure.told))
+    end, every = MOST_VALUES // 2, numbers.count(len(figure.told))
+    whole = len(figure.told) <= MOST_VALUES
+    told = figure.told if whole else (*figure.told[:end], *figure.told[-end:])
     labels = sorted(_labels(figure), key=lambda one: any(one not in t.says for t in figure.told))
     columns = [worded(padded([t.says.get(label, "") for t in told])) for label in labels]
-    note = f"The first {MOST_VALUES} of {every}; the figure tells them all, one by one."
-    note = "" if len(told) == len(figure.told) else note
+    note = f"The first and the last {end} of {every}; the figure tells them all, one by one."
+    note = "" if whole else note
     return table(caption, labels, zip(*columns, strict=True), note)
 
 

@@ -1,0 +1,99 @@
+"""The page of `watch`: what it says of runs, evidence and courses."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from browsing import flaws_of
+from html_page import Page
+from syncline_design.campaign.watch_result import e_value_text
+from watched_series import (
+    BOUND,
+    LABELS,
+    car_spec,
+    kept,
+    run_of,
+    series,
+    statistics,
+    told,
+    watch,
+)
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return car_spec(tmp_path_factory.mktemp("watch") / "spec.yaml")
+
+
+def test_its_page_is_sound(browser: object, spec: Path, tmp_path: Path) -> None:
+    change = np.array([9.0, 0, 0, 0, 0]) * BOUND
+    runs = [run_of(one, day) for day, one in enumerate(series(11, 5, change, 3))]
+    path = tmp_path / "watch.html"
+    watch(kept(spec, tmp_path, runs), spec, "-o", f"html:{path}")
+    page = path.read_text("utf-8")
+    assert "fig-courses-2" in page
+    for label in ("syncline-design", "Spec, SHA-256", "Catalogs, SHA-256"):
+        assert label in Page(page).text
+    assert flaws_of(browser, path) == []
+
+
+def test_the_courses_are_not_shifted_by_what_changed(spec: Path, tmp_path: Path) -> None:
+    """A build with a datum that is off, of which the latency is moved by 30 bounds with run 7.
+
+    Where the mean change is taken for the build's own, the datum's north, which moves runs nearly
+    alike, is off by ten standard deviations on every day.  Of 50 values one is beyond 4.2 of them
+    with a chance of 0.13 %.
+    """
+    rng, change = np.random.default_rng(51), 30.0 * BOUND[0]
+    build = np.array([0, 0, 25.0, 0, -40.0]) * BOUND
+    moved = build + np.array([change, 0, 0, 0, 0])
+    found = [statistics(rng, moved if day >= 6 else build, 0.9) for day in range(10)]
+    store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found)])
+    runs = told(spec, store, tmp_path, 1)["runs"]
+    for (effect, _, _, name), true in zip(LABELS, build, strict=True):
+        every = [v for run in runs for v in run["values"] if v["parameter"] == name]
+        values, spread = (np.array([v[k] for v in every])
+                          for k in ("value", "standard_uncertainty"))  # fmt: skip
+        expected = true + np.where((np.arange(10) >= 6) & (effect == "latency"), change, 0.0)
+        assert np.max(np.abs(values - expected) / spread) < 4.2, name
+
+
+def test_evidence_beyond_the_figure_is_told_as_it_is(spec: Path, tmp_path: Path) -> None:
+    """The figure ends at 1e12 and says so; its words are the e-values of the answer."""
+    runs = series(21, 9, np.array([30.0, 0, 0, 0, 0]) * BOUND, 6)
+    store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(runs)])
+    last = told(spec, store, tmp_path, 1)["e_value"]
+    assert last > 1e20
+    page = Page((tmp_path / "watch.html").read_text("utf-8"))
+    assert "Drawn up to 1e+12" in page.text
+    assert page.text.count(e_value_text(last)) >= 3  # headline, values of the figure, runs
+
+
+def test_courses_have_the_digits_of_their_uncertainty(spec: Path, tmp_path: Path) -> None:
+    """Two digits of half of the middle interval, the same places in every row."""
+    runs = [run_of(one, day) for day, one in enumerate(series(21, 9, 50.0 * BOUND, 0))]
+    found = told(spec, kept(spec, tmp_path, runs), tmp_path, 0)
+    values = [v for run in found["runs"] for v in run["values"] if v["parameter"] == "latency_s"]
+    half = 1e3 * np.median([v["interval95"][1] - v["interval95"][0] for v in values]) / 2.0
+    assert 0.1 < half < 1.0  # ms, so that two digits are two places
+    page = Page((tmp_path / "watch.html").read_text("utf-8"))
+    text = page.text.replace("\u00a0", " ").replace("\u2212", "-")
+    assert all(f"{1e3 * v['value']:.2f} ms" in text for v in values)
+
+
+def test_many_runs_have_round_ticks_and_a_table_of_bounded_height(
+    spec: Path, tmp_path: Path
+) -> None:
+    runs = [run_of(one, day) for day, one in enumerate(series(21, 75, 0.0 * BOUND, 99))]
+    path = tmp_path / "watch.html"
+    watch(kept(spec, tmp_path, runs), spec, "-o", f"html:{path}")
+    page = path.read_text("utf-8")
+    svg = page.partition('id="fig-evidence')[2].partition("</svg>")[0]
+    ticks = [t for t in re.findall(r"<text[^>]*>\s*(\d+)\s*</text>", svg) if int(t) > 1]
+    assert {"20", "40", "60"} <= set(ticks)
+    assert not {"21", "22", "42", "62"} & set(ticks)
+    assert 'class="scroll long' in page
