@@ -37,6 +37,15 @@ FLAWS = """(width) => {
     if (seen(head) && !(next && (next.innerText.trim() || next.querySelector('svg'))))
       flaws.push('nothing below ' + head.innerText);
   });
+  if (width > 1000) document.querySelectorAll('.alone > figure').forEach(figure => {
+    const frame = figure.querySelector('.beneath .inner');
+    if (!frame || !seen(frame)) return;
+    const foot = e => figure.querySelector(e).getBoundingClientRect().bottom;
+    const over = foot('.beneath') - foot('.drawing'), name = frame.ariaLabel;
+    const cut = frame.scrollHeight > frame.clientHeight + 1;
+    if (cut && over < -40) flaws.push(`cut ${-over} px above the foot of its figure: ${name}`);
+    if (over > 80) flaws.push(`${over} px longer than its figure: ${name}`);
+  });
   document.querySelectorAll('figure svg').forEach(svg => {
     if (!seen(svg)) return;
     const name = svg.querySelector('title').textContent, frame = svg.getBoundingClientRect();

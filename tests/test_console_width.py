@@ -44,7 +44,17 @@ def test_no_line_is_wider_than_the_terminal(
 @pytest.mark.parametrize("name", SPECS)
 def test_every_word_is_said_at_every_width(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     wide = set(said(name, 400, monkeypatch).split())
-    first_heads = {"Requirement", "Role", "Stage", "Figure", "Model", "Term", "Sensor", "Option"}
+    first_heads = {
+        "Requirement",
+        "Role",
+        "Stage",
+        "Figure",
+        "Model",
+        "Term",
+        "Sensor",
+        "Option",
+        "Design",
+    }
     for width in WIDTHS:
         narrow = said(name, width, monkeypatch)
         # rows that became records name themselves without the first head

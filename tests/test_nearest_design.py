@@ -20,6 +20,7 @@ from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.spec.load import load_text
+from syncline_design.verdict.named import PricedError
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPECS = Path(__file__).parent.parent / "specs"
@@ -76,9 +77,47 @@ def test_the_nearest_design_is_that_of_the_least_change(accuracy: str, cost: str
             assert fix.relative == pytest.approx(abs(fix.to - fix.from_) / fix.from_)
     priced = [(p.cost, p.error_m) for p in near.front]
     assert priced == plain_front(spec, every)
+    for point in near.front:
+        same = twin(every, point)
+        told = {one.requirement: (one.value, one.limit) for one in point.misses or ()}
+        assert told == {
+            name: pytest.approx((value(same, limits_of(spec)[name][0]), limits_of(spec)[name][1]))
+            for name in failed(spec, same)
+        }
     assert "The nearest design" in console(on_verdict(verdict))
     if accuracy == "5 cm":
         assert "Nearest: " in html(on_verdict(verdict))  # drawn, and said for those who cannot see
+
+
+def twin(every: list[Outcome], point: PricedError) -> Outcome:
+    """The enumerated design of the same sensors and stamps; it costs and errs as much."""
+    assert point.design is not None
+    named = [(role.sensor, role.primitive, role.timestamping) for _, _, role in point.design.roles]
+    (found,) = (
+        one for one in every if [(o.sensor, o.primitive, o.method) for o in one.options] == named
+    )
+    assert (found.cost, found.total_m) == pytest.approx((point.cost, point.error_m), rel=1e-9)
+    return found
+
+
+def test_the_front_of_an_infeasible_spec_says_which_designs_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Both ends in words with what they miss, on the console too; every dot by its sensors."""
+    text = (SPECS / "infeasible_example.yaml").read_text("utf-8")
+    verdict = check_loaded(load_text(text, "specs/infeasible_example.yaml"), QUIET)
+    monkeypatch.setenv("COLUMNS", "300")
+    said = console(on_verdict(verdict))
+    cheapest, exact = (
+        next(line for line in said.splitlines() if line.strip().startswith(end))
+        for end in ("cheapest", "most exact")
+    )
+    assert "32 742.35 EUR  575.6 cm  ACC-1: 575.6 cm where 5 cm is asked" in cheapest
+    assert "ublox_f9p_pvt by arrival, arrival" in cheapest
+    assert "COST-1: 141 762.35 EUR where 60 000 EUR is asked" in exact
+    page = html(on_verdict(verdict))
+    values = page[page.index("fig-front") :]
+    assert "u-blox F9P with RTK corrections (hardware), Kongsberg Seatex MRU 5" in values
 
 
 def plain_front(spec: dict[str, Any], every: list[Outcome]) -> list[Any]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from syncline_design.report import numbers
-from syncline_design.report.document import Chart, Heading, Node, Text
+from syncline_design.report.choice_tables import sensors
+from syncline_design.report.document import Chart, Heading, Node, Text, show
+from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.words import KINDS
-from syncline_design.verdict.named import MissedLimit, Nearest
+from syncline_design.verdict.named import MissedLimit, Nearest, PricedError
 from syncline_design.verdict.tree import UNITS
 
 if TYPE_CHECKING:
@@ -40,15 +42,43 @@ def nearest_nodes(
     """What it is, what it misses and by how much; drawn with the limits of accuracy and cost."""
     if found is None:
         return []
-    sensors = ", ".join(
+    who = ", ".join(
         f"{stage.name} {role}: {one.name} by {one.primitive}, {one.timestamping_name}"
         for stage, role, one in found.design.roles
     )
     cost = "a price that is not told" if found.cost is None else numbers.money(found.cost, currency)
     error = numbers.error(found.error_m, limit)
-    missed = " and ".join(_missed(one) for one in found.misses)
-    text = f"{sensors}. It costs {cost}, its Syncline error is {error}; it misses {missed}."
-    return [Heading("The nearest design"), Text(text), *_chart(found, currency, limit, price)]
+    text = f"{who}. It costs {cost}, its Syncline error is {error}; it misses {_all(found)}."
+    return [
+        Heading("The nearest design"), Text(text), *_chart(found, currency, limit, price),
+        *show(ends_table(found, currency, limit)),
+    ]  # fmt: skip
+
+
+def ends_table(found: Nearest, currency: str, limit: numbers.Limited | None) -> Table | None:
+    """The ends of the front that the chart draws: what they are and how far they miss.
+
+    Of a front of one design there are no two ends; that design is a row.
+    """
+    ends = (("cheapest", found.front[:1]), ("most exact", found.front[-1:]))
+    named = ends if len(found.front) > 1 else (("cheapest and most exact", found.front[:1]),)
+    rows = [
+        [
+            Cell(end), Cell(numbers.money(one.cost, currency), one.cost),
+            Cell(numbers.error(one.error_m, limit), one.error_m), Cell(_all(one) or "nothing"),
+            *(Cell(f"{role.sensor} by {role.primitive}, {role.timestamping}")
+              for _, _, role in one.design.roles),
+        ]
+        for end, points in named for one in points if one.design is not None
+    ]  # fmt: skip
+    roles = [f"{stage.name} {role}" for stage, role, _ in found.design.roles]
+    heads = ("Design", "Cost #", "Error #", "Misses", *roles)
+    title = "Cheapest and most exact, all but cost and accuracy met"
+    return table(title, heads, rows) if rows else None
+
+
+def _all(found: Nearest | PricedError) -> str:
+    return " and ".join(_missed(one) for one in found.misses or ())
 
 
 def _missed(one: MissedLimit) -> str:
@@ -67,7 +97,13 @@ def _chart(
     def draw() -> InlineChart:
         from syncline_design.report.charts_front import FrontMark, pareto_front
 
-        drawn = [FrontMark(point.cost, point.error_m, False) for point in points]
+        drawn = [
+            FrontMark(
+                point.cost, point.error_m, False,
+                "" if point.design is None else sensors(point.design),
+            )
+            for point in points
+        ]  # fmt: skip
         return pareto_front(drawn, currency, limit, price, beside=at)
 
     caption = (

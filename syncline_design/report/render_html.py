@@ -28,6 +28,8 @@ MOST_VALUES: Final = 200  # rows of the table below a figure; of more both ends
 _LINE: Final = 30  # characters of a column that holds sentences
 _TABLET: Final = 92  # characters in a line of a table there
 _PHONE: Final = 48
+_FEW: Final = 16  # lines of a table that is shown whole below its figure
+_BOX: Final = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 _NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
 _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
@@ -99,12 +101,14 @@ def _environment() -> Environment:
     environment.tests["wide"] = lambda shown: _needed(shown) > _TABLET
     environment.tests["narrow"] = lambda shown: _needed(shown) <= _PHONE
     environment.tests["wordy"] = _is_wordy
+    environment.tests["few"] = lambda shown: _lines(shown) <= _FEW
     environment.filters["dated"] = dated
     environment.filters["whole"] = _whole
     environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
     environment.filters["points"] = _points
     environment.filters["values"] = _values
+    environment.filters["shape"] = _shape
     environment.filters["drawing"] = Markup  # matplotlib has escaped the texts in it
     return environment
 
@@ -160,6 +164,12 @@ def _values(figure: InlineChart, caption: str) -> Table | None:
     return table(caption, labels, zip(*columns, strict=True), note)
 
 
+def _shape(figure: InlineChart) -> str:
+    """A figure's height over its width, for the style sheet to work out."""
+    box = _BOX.search(figure.svg)
+    return "1" if box is None else f"{box[2]} / {box[1]}"
+
+
 def _labels(figure: InlineChart) -> list[str]:
     return list(dict.fromkeys(label for t in figure.told for label in t.says))
 
@@ -173,6 +183,11 @@ def _needed(shown: Table) -> int:
         longest = longest if head.numeric else min(longest, _LINE)
         needed += 2 + max(longest, *(2 + len(word) for word in words or [""]))  # with its arrow
     return needed
+
+
+def _lines(shown: Table) -> int:
+    """Lines of a table beside its figure, where a cell of many words has several."""
+    return sum(max(1, *(-(-len(cell.text) // _LINE) for cell in row)) for row in shown.rows)
 
 
 def _is_wordy(shown: Table) -> bool:

@@ -226,10 +226,15 @@ class MissedLimit(Record):
 
 @dataclass(frozen=True, slots=True)
 class PricedError(Record):
-    """What a design costs and how much it errs."""
+    """A design of the front of an infeasible spec: what it costs, how much it errs, what it misses.
+
+    misses: the tightest requirements on cost and accuracy that it does not keep.
+    """
 
     cost: float
     error_m: float
+    misses: tuple[MissedLimit, ...] | None = optional()
+    design: NamedDesign | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 
-from syncline_design.choice.evaluate import Evaluation, evaluate
+from syncline_design.choice.evaluate import Evaluation, broken, evaluate
 from syncline_design.choice.fixes import Move, with_moves
 from syncline_design.choice.front import front
 from syncline_design.choice.holding import best_design
@@ -20,6 +20,7 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import LIMIT_DIMENSIONS
 from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.named import MissedLimit, Nearest, PricedError
+from syncline_design.verdict.tree import UNITS
 
 LIMITS = frozenset(LIMIT_DIMENSIONS)  # kinds of fix that move a limit and nothing else
 ROOM = Fraction(1, 10**12)  # for a limit that was rounded to a float on its way
@@ -52,7 +53,7 @@ def _of(case: Case, problem: Problem, fixes: Sequence[Fix], build: Build) -> Nea
         for fix in fixes
     )
     shown = full_design(moved, eased, design)
-    return Nearest(cost, mass, power, sums.error_m, misses, shown, _front(problem))
+    return Nearest(cost, mass, power, sums.error_m, misses, shown, _front(case, problem, written))
 
 
 def _move(case: Case, fix: Fix) -> Move:
@@ -65,8 +66,7 @@ def _move(case: Case, fix: Fix) -> Move:
 
 def _reached(problem: Problem, design: Design, sums: Evaluation, fix: Fix) -> float:
     """What the design reaches; of its sync ratio the limit that was shown to do."""
-    summed = {"accuracy": sums.error_m, "cost": sums.cost, "mass": sums.mass, "power": sums.power}
-    value = summed.get(fix.kind)
+    value = _sum_of(sums, fix.kind)
     if value is not None:
         return float(value)
     judge, name = problem.judge, fix.requirement
@@ -75,12 +75,44 @@ def _reached(problem: Problem, design: Design, sums: Evaluation, fix: Fix) -> fl
     return fix.to or 0.0
 
 
+def _sum_of(sums: Evaluation, kind: str) -> Fraction | float | None:
+    """The sum that a kind of requirement limits; None of what is no sum, or not known."""
+    return {
+        "accuracy": sums.error_m, "cost": sums.cost, "mass": sums.mass, "power": sums.power
+    }.get(kind)  # fmt: skip
+
+
 def _missed(fix: Fix, reached: float, written: str | None) -> MissedLimit:
     kind = fix.kind
     return MissedLimit(fix.requirement, kind, reached, fix.from_ or 0.0, fix.unit or "", written)
 
 
-def _front(problem: Problem) -> tuple[PricedError, ...]:
+def _front(
+    case: Case, problem: Problem, written: Mapping[str, str | None]
+) -> tuple[PricedError, ...]:
+    """Of all that keeps every sum but cost and accuracy, the cheapest for each error."""
     costs = [part for part in parts_of(problem) if part.kind == "cost"]
     bare = replace(lifted(problem, costs), judge=None)
-    return tuple(PricedError(float(p.amount), p.error_m) for p in front(bare))
+    return tuple(
+        PricedError(
+            float(point.amount),
+            point.error_m,
+            tuple(_broken_limits(case, problem, point.design, written)),
+            full_design(case, problem, point.design),
+        )
+        for point in front(bare)
+    )
+
+
+def _broken_limits(
+    case: Case, problem: Problem, design: Design, written: Mapping[str, str | None]
+) -> Iterator[MissedLimit]:
+    """The sums of a design that are beyond their tightest limit."""
+    sums, limits = evaluate(problem, design), problem.limits
+    kinds, ids = broken(problem, sums), dict(limits.ids)
+    for kind, limit in (("accuracy", limits.accuracy_m), ("cost", limits.cost)):
+        value = _sum_of(sums, kind)
+        if kind in kinds and value is not None and limit is not None:
+            name, unit = ids.get(kind), UNITS.get(kind, case.spec.currency)
+            words = written.get(name or "")
+            yield MissedLimit(name, kind, float(value), float(limit), unit, words)
