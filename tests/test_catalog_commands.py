@@ -359,8 +359,9 @@ def test_a_file_without_entries_takes_one(tmp_path: Path, text: str) -> None:
 
 def test_a_second_stub_gets_an_id_of_its_own(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
-    for _ in range(3):
-        assert run("add", "--from-template", "usbl", "--to", str(path)).exit_code == 0
+    said = [run("add", "--from-template", "usbl", "--to", str(path)) for _ in range(3)]
+    assert [one.exit_code for one in said] == [0, 0, 0]
+    assert said[2].stderr.startswith(f"new_usbl_3 written to {path}: fill in every _")
     document = read(path)
     assert not document.problems
     assert list(document.data["sensors"]) == ["new_usbl", "new_usbl_2", "new_usbl_3"]

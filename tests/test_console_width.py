@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import io
 from pathlib import Path
 
 import pytest
@@ -121,3 +122,33 @@ def test_a_record_that_a_bare_number_heads_says_of_what() -> None:
 
 def test_a_word_longer_than_the_line_is_not_broken() -> None:
     assert folded("see /a/very/long/path.yaml now", 10) == ["see", "/a/very/long/path.yaml", "now"]
+
+
+@pytest.mark.parametrize(
+    ("environment", "terminal", "coloured"),
+    [
+        ({}, True, True),
+        ({}, False, False),
+        ({"NO_COLOR": "1"}, True, False),
+        ({"NO_COLOR": ""}, True, True),
+        ({"FORCE_COLOR": "1"}, False, True),
+        ({"FORCE_COLOR": ""}, False, False),
+        ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False, False),
+        ({"TERM": "dumb"}, True, False),
+        ({"TERM": "dumb", "FORCE_COLOR": "1"}, True, True),
+    ],
+)
+def test_colours_are_where_they_can_be_shown_or_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], terminal: bool, coloured: bool
+) -> None:
+    """Rules of no-color.org and force-color.org: what is empty says nothing."""
+    for name in ("NO_COLOR", "FORCE_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    stream = io.StringIO()
+    monkeypatch.setattr(stream, "isatty", lambda: terminal)
+    monkeypatch.setattr("sys.stdout", stream)
+    text = render_console.console(on_verdict(verdict_of("infeasible_example")))
+    assert ("\x1b[31m" in text, "\x1b[" in text) == (coloured, coloured)

@@ -24,6 +24,7 @@ from syncline_design.cli.shared import (
     refuse,
     show,
 )
+from syncline_design.machine.streams import say
 from syncline_design.model.roles import ROLES
 from syncline_design.report.formats import CATALOG_FORMATS, FileName, ResultName
 
@@ -192,6 +193,8 @@ def catalog_add(
     before, sections = _catalog_there(to)
     section, text = stub(kind, day, lambda part, name: name in sections.get(part, {}))
     write_outputs([(OutputTarget("text", str(to)), put_in(before, section, text))])
+    identity = text.partition(":")[0].strip()
+    say(f"{identity} written to {to}: fill in every _, then syncline-design catalog check {to}")
     return 0
 
 

@@ -48,8 +48,15 @@ def columns() -> int:
 
 
 def supports_colour() -> bool:
-    """Colour only on a terminal, and never against NO_COLOR."""
-    return sys.stdout.isatty() and "NO_COLOR" not in os.environ
+    """Colour on a terminal that has it, or where FORCE_COLOR asks for it; never against NO_COLOR.
+
+    A variable that is empty says nothing (no-color.org, force-color.org).
+    """
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR"):
+        return True
+    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def _painter(colour: bool | None) -> Paint:
