@@ -212,6 +212,18 @@ def test_a_diagram_of_clocks_has_names_in_full_where_three_lines_hold_them() -> 
     assert "\u2026" not in said
 
 
+def test_a_diagram_of_clocks_breaks_no_word_and_no_figure() -> None:
+    """A name of a key goes on after its dot, a role keeps its word, a unit its figure."""
+    sensor = Stamped("multirotor \u00b7 position", "multirotor.position", "1PPS input",
+                     "Timer or FPGA capture (100 MHz)", False, 1e-8, None, True)  # fmt: skip
+    drawn = clocks([ClockedVehicle("multirotor", (sensor,), "OCXO", 7.3e-5)])
+    texts = re.findall(r"<text[^>]*>([^<]*)</text>", drawn.svg)
+    assert {"multirotor.", "position", "(100\u00a0MHz)"} <= set(texts)
+    (role,) = (text for text in texts if "\u00b7" in text)
+    assert role.startswith("multi")
+    assert role.endswith("\u2026 \u00b7 position")
+
+
 @pytest.mark.parametrize(
     ("label", "shown"),
     [("2.92522 m/s", "2.925 m/s"), ("0.0123456 deg", "0.01235 deg"), ("12 m", "12 m"),

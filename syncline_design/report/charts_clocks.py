@@ -6,6 +6,7 @@ in: the vehicle's host clock, or UTC.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from textwrap import wrap
 from typing import TYPE_CHECKING, Final
@@ -15,7 +16,7 @@ from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, GRID, INK, LINE, MUTED, SERIES, SHADE
 from syncline_design.report.svg import InlineChart, draw, tell
-from syncline_design.report.text import shortened, visible
+from syncline_design.report.text import shortened, unbroken, visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +28,9 @@ HEAD: Final = 20.0  # of a vehicle's name [SVG units]
 BOX, HOST, UTC, BAR = 112.0, 268.0, 318.0, 18.0  # right end of the boxes; left ends; width
 LETTERS: Final = 17, 28  # in a line of a box, in one above or below an arrow
 CLOCK_LETTERS: Final = 40  # in a line of a clock's name
+_MARK: Final = re.compile(r"(?<=[._/])(?=\w)")
+_JOINED: Final = "\N{WORD JOINER}"  # begins what goes on with a word
+_DOT: Final = " \N{MIDDLE DOT} "
 MOST_LINES: Final = 3  # of a name: a longer one is cut, its tooltip has it in full
 
 
@@ -83,11 +87,24 @@ def clocks(vehicles: Sequence[ClockedVehicle], name: str = "fig-clocks") -> Inli
 
 
 def _lines(text: str, letters: int) -> list[str]:
-    """A name in lines, broken where its words are."""
-    found = wrap(visible(text), letters)
+    """A name in lines, broken where its words are, a longer one after its dots, no unit off."""
+    parted = " ".join(
+        _MARK.sub(f" {_JOINED}", word) if len(word) > letters else word
+        for word in unbroken(visible(text)).split(" ")
+    )
+    found = [line.replace(f" {_JOINED}", "").replace(_JOINED, "") for line in wrap(parted, letters)]
     if len(found) <= MOST_LINES:
         return found
     return [*found[: MOST_LINES - 1], shortened(f"{found[MOST_LINES - 1]} ...", letters)]
+
+
+def _role(text: str) -> str:
+    """`multi... · position`: what cannot stay of a role is the end of its stage's name."""
+    stage, dot, role = text.rpartition(_DOT)
+    left = LETTERS[0] - len(dot) - len(role)
+    return (
+        f"{shortened(stage, left)}{dot}{role}" if dot and left > 1 else shortened(text, LETTERS[0])
+    )
 
 
 def _signal(one: Stamped) -> str:
@@ -138,7 +155,7 @@ def _sensor(axes: Axes, one: Stamped, y: float) -> None:
                              edgecolor=GRID, linewidth=1.2))  # fmt: skip
     names = _lines(one.sensor, LETTERS[0])
     head = y - 0.5 * STEP * len(names)
-    axes.text(8.0, head, shortened(one.role, LETTERS[0]), va="center", color=MUTED)
+    axes.text(8.0, head, _role(one.role), va="center", color=MUTED)
     for k, name in enumerate(names, 1):
         axes.text(8.0, head + k * STEP, name, va="center", color=INK)
     colour = LINE if one.within else BAD
