@@ -20,6 +20,7 @@ from tests.flight_logs import (
     write_mcap,
     write_ros1,
     write_ros2,
+    write_ulog,
 )
 
 MADE = flight(6.0)
@@ -140,6 +141,42 @@ def test_changed_bytes_are_told_or_harmless(tmp_path: Path, writer: str) -> None
             continue
         assert sum(s.messages for s in streams) <= 60
     assert refused < 8
+
+
+@pytest.mark.parametrize("bit", [17, 33, 40, 62, 63])
+def test_a_bag_whose_header_tells_no_place_of_its_index_is_read_from_the_front(
+    tmp_path: Path, bit: int
+) -> None:
+    """One changed bit of index_pos: no message is behind it, and nothing was cut off."""
+    path = write_ros1(tmp_path / "a.bag", flight(2.0))
+    data = path.read_bytes()
+    at = data.index(b"index_pos=") + len(b"index_pos=")
+    (index,) = struct.unpack_from("<Q", data, at)
+    assert not index >> bit & 1
+    path.write_bytes(data[:at] + struct.pack("<Q", index | 1 << bit) + data[at + 8 :])
+    recording = open_recording(path)
+    assert {s.name: s.messages for s in recording.streams()} == dict.fromkeys(
+        ("/fix", "/imu", "/odom"), 20
+    )
+    assert recording.incomplete is not None
+    assert "index" in recording.incomplete.reason
+    assert "cut off" not in recording.incomplete.reason
+
+
+@pytest.mark.parametrize("write", [write_ros1, write_mcap, write_ulog])
+def test_the_top_bit_of_any_position_or_length_is_damage(
+    tmp_path: Path, write: Callable[[Path, Flight], Path]
+) -> None:
+    """Heads and ends of files hold positions and times of 64 bits: read, or refused."""
+    path = write(tmp_path / "a.log", flight(1.0))
+    data = path.read_bytes()
+    changed = sorted({*range(13, 150), *range(len(data) - 300, len(data))})
+    for at in changed:
+        path.write_bytes(data[:at] + bytes([data[at] ^ 0x80]) + data[at + 1 :])
+        try:
+            open_recording(path).streams()
+        except BadInput:
+            continue
 
 
 def test_a_bomb_is_refused_before_it_unpacks(tmp_path: Path) -> None:

@@ -90,7 +90,7 @@ class McapFile(Container):
                     yield record
                 return
             except DamagedError as damage:
-                later = [one for one in self._indexed(file) if one > at]
+                later = [one for one in self._indexed(file) if at < one < self._size]
                 if not later:
                     raise
                 self.lost.add(damage)
@@ -106,7 +106,7 @@ class McapFile(Container):
             file.seek(max(self._size - len(MAGIC) - _RECORD.size - _FOOTER.size, 0))
             kind, _ = _RECORD.unpack(file.read(_RECORD.size))
             begins = _FOOTER.unpack(file.read(_FOOTER.size))[0] if kind == FOOTER else 0
-            if begins:
+            if 0 < begins < self._size:  # beyond 63 bits no file offset
                 file.seek(begins)
                 for record in self._of(file, whole=False):
                     if isinstance(record, self._records.ChunkIndex):

@@ -26,7 +26,7 @@ from syncline_design.logs.refusals import refuse
 
 MAGIC = b"#ROSBAG V2.0\n"
 FORMAT = "ROS 1 bag"
-MESSAGE, BAG_HEADER, CHUNK, CONNECTION = 2, 3, 5, 7
+MESSAGE, BAG_HEADER, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 5, 6, 7
 MOST_HEADER = 1 << 20
 MOST_RECORD = 1 << 28  # bytes of a chunk, and of what it unpacks to
 _LENGTH = struct.Struct("<I")
@@ -52,7 +52,7 @@ class Ros1Bag(Container):
                 try:
                     yield from self._record(file, budget)
                 except DamagedError as damage:
-                    later = [one for one in self._indexed(file, index) if one > at]
+                    later = [k for k in self._indexed(file, index) if at < k < self._size]
                     if not later:
                         raise
                     self.lost.add(damage)
@@ -79,6 +79,8 @@ class Ros1Bag(Container):
         elif operation in (MESSAGE, CONNECTION):
             yield from self._one(operation, fields, _taken(file, length))
         else:
+            if operation == CHUNK_INFO and self.cut:  # the index is here, and nothing cut off
+                self.cut = "damaged: its index is not where the bag's header says"
             _skip(file, length, self._size)
 
     def _of_packed(
@@ -92,7 +94,7 @@ class Ros1Bag(Container):
             return self._chunks
         self._chunks, known, here = [], dict(self._channels), file.tell()
         try:
-            file.seek(index or self._size)
+            file.seek(min(index or self._size, self._size))  # no file offset: beyond 63 bits
             while file.tell() < self._size:
                 fields, length = _record_head(file)
                 data = _taken(file, length)

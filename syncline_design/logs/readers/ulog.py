@@ -294,7 +294,7 @@ def _count(topic: _Topic, data: bytes) -> None:
         utc = _nanoseconds(data, fields[UTC][0])
         if utc < EARLIEST_NS:
             topic.utc_unset += 1
-        elif len(topic.utc) < MOST_UTC:
+        elif stamp != UNSET and len(topic.utc) < MOST_UTC:
             topic.utc.append((stamp, utc))
 
 
