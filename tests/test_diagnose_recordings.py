@@ -182,7 +182,7 @@ def test_two_trajectories_are_compared_pose_by_pose(tmp_path: Path) -> None:
     assert abs(value - LATE_S) < 5.0 * sigma + 1e-3
     (one,) = [f for f in result.findings if f.kind == "cause"]
     assert one.also == ("attitude",)  # one delay of the whole system, not two
-    assert one.sentence.lower().startswith("position and attitude data are")
+    assert one.sentence.startswith("Position and attitude data are")
     entries = {(e.effect, e.sensor) for e in result.effects_entries()}
     assert entries == {("latency", "position"), ("latency", "attitude")}
 

@@ -62,7 +62,7 @@ def _joined(place: Finding, turn: Finding, a: Estimate, b: Estimate) -> Finding:
     return replace(
         place,
         parameters={name: estimate},
-        sentence=plain_delay().in_words("position and attitude", {name: text}),
+        sentence=plain_delay().in_words("Position and attitude", {name: text}),
         evidence=f"{place.evidence}; of the attitude: {turn.evidence}",
         gain_nat=place.gain_nat + turn.gain_nat,
         material=place.material or turn.material,
