@@ -63,3 +63,15 @@ def test_what_is_there_keeps_its_name(effect: Hidden, tmp_path: Path) -> None:
     assert (one.sensor, one.kind, one.material) == (effect.sensor, "cause", True)
     assert "it changes with" not in one.sentence
     assert found.verdict == "explained"
+
+
+@pytest.mark.parametrize("vehicle", ["car_stops", "multirotor_lines"])
+def test_a_drift_that_may_not_be_named_is_no_step(vehicle: str, tmp_path: Path) -> None:
+    """A clock that drifts from the log's start on is at nothing there, as before a step."""
+    drift = hidden("clock_drift", "position", rate=1.2e-4)
+    log = make_log(scenario(vehicle, 6, 100.0, 5.0), (drift,))
+    found = asked(log, tmp_path, ("clock_drift",))
+    steps = [one for one in found.findings if one.effect == "timestamp_step"]
+    assert {one.kind for one in steps} <= {"stand_in"}
+    assert found.verdict == "unexplained"
+    assert found.effects_entries() == ()

@@ -93,6 +93,12 @@ class States:
         asked = (model, self.data, self.block, self.explained, own)
         return self.kept.of(asked, made).judged(groups)
 
+    def beside(self, *columns: Array) -> States:
+        """The same with slow courses sized beside these columns (n, 3, p) as well: what is asked
+        for is no slow noise before it is answered."""
+        known = () if self.explained is None else (self.explained,)
+        return replace(self, explained=np.concatenate([*known, *columns], axis=2))
+
     def own(self, model: Model) -> list[Judged]:
         """The model's own effects, all together: one entry for each, marginal over the others.
 

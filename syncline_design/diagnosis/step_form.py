@@ -35,7 +35,11 @@ def refuted_steps(states: States, model: Model) -> frozenset[Label]:
     steps = [one for one in model.acting if any(p.located for p in one.effect.parameters)]
     if not steps:
         return frozenset()
-    judged = states.judged(model, [_ramp(states, one) for one in steps])
+    view = states.data.view
+    always = [np.nan_to_num(slopes(view, (_always(one),))) for one in steps]
+    ramps = [_ramp(states, shape) for shape in always]
+    own = np.concatenate([np.nan_to_num(slopes(view, model.acting)), *always], axis=2)
+    judged = states.beside(*ramps).judged(model, ramps, own)
     return frozenset(
         one.label for one, beside in zip(steps, judged, strict=True)
         if beside.model_log_p < REFUTED or _always_as_well(states.data, model, one)
@@ -54,10 +58,9 @@ def _always(one: Acting) -> Acting:
     return replace(one, values={**one.values, **located})
 
 
-def _ramp(states: States, one: Acting) -> Array:
-    """The shape (n, 3, p) that the effect has in all of the log, times the time from its middle."""
-    view = states.data.view
-    always = np.nan_to_num(slopes(view, (_always(one),)))
-    since = view.log.time_s - 0.5 * (view.log.time_s[0] + view.log.time_s[-1])
+def _ramp(states: States, always: Array) -> Array:
+    """The shape (n, 3, p) that an effect has in all of the log, times the time from its middle."""
+    time_s = states.data.view.log.time_s
+    since = time_s - 0.5 * (time_s[0] + time_s[-1])
     ramp: Array = always * (since / max(float(np.ptp(since)), 1e-9))[:, None, None]
     return ramp
