@@ -367,3 +367,30 @@ def test_a_noisier_run_is_a_caution(spec: Path, tmp_path: Path) -> None:
     document = told(spec, kept(spec, tmp_path, runs), tmp_path, 0)
     assert document["cautions"] == ["noise of car, position in run 4 is 2.5 times that of the "
                                     "runs before"]  # fmt: skip
+
+
+def test_what_a_change_moves_along_is_not_said_to_differ(spec: Path, tmp_path: Path) -> None:
+    """Sixty bounds of latency from run 6 on: nothing else is another in every run."""
+    for seed in range(3):
+        rng = np.random.default_rng(300 + seed)
+        build = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+        moved = np.array([60.0, 0, 0, 0, 0]) * BOUND
+        found = [statistics(rng, build + moved * (k >= 5), 0.9) for k in range(10)]
+        store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found)])
+        document = told(spec, store, tmp_path, 1)
+        assert [one["effect"] for one in document["alarms"]] == ["latency"]
+        assert document["cautions"] == []
+        store.unlink()
+
+
+@pytest.mark.parametrize(("days", "odd"), [(358, True), (5, False)])
+def test_a_date_long_before_all_others_is_asked_about(
+    days: int, odd: bool, spec: Path, tmp_path: Path
+) -> None:
+    """A clock that is a year behind puts the newest run first; an earlier day may come in late."""
+    found = series(11, 6, np.array([9.0, 0, 0, 0, 0]) * BOUND, 5)
+    runs = [run_of(one, day) for day, one in enumerate(found[:5])]
+    runs.append(run_of(found[5], -days))
+    said = told(spec, kept(spec, tmp_path, runs), tmp_path, 1)["cautions"]
+    assert [one.startswith("run 6 (day-358.csv) is dated 2025-") for one in said] == [True] * odd
+    assert all("358 days before all that were added before it" in one for one in said)

@@ -16,6 +16,7 @@ from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.changes import Change, Changes
 from syncline_design.campaign.joint import JointError
 from syncline_design.campaign.looks import KeptLook, keys_of, known_first
+from syncline_design.campaign.oddities import cautions
 from syncline_design.campaign.pool import Pool, Term, pool_of
 from syncline_design.campaign.run_values import RunParameter, run_values
 from syncline_design.campaign.store import (
@@ -52,7 +53,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_estimate, to_digits
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.normal import NORMAL_95
 from syncline_design.spec.case import Case
 
@@ -65,7 +66,6 @@ AS_GOOD_NATS: Final = 2.0
 RIVAL_NATS: Final = 3.0
 MOST_CHANGES: Final = 4
 CREDIBLE: Final = 0.95
-NOISIER: Final = 1.5  # times the median of the runs before
 SHOWN: Final = 2.0  # standard uncertainties from which a parameter of a changed effect is told
 
 
@@ -269,11 +269,15 @@ class Watching:
                            max(len(self.ordered) - 1, 0)),
             baseline_after=stored.baselines[-1] if stored.baselines else 0,
             ordered_by="date" if dated else "adding",
-            cautions=tuple(self._cautions()),
+            cautions=self._cautions(),
             last=stored.last,
             torn=torn,
             provenance=WatchProvenance(__version__, case.spec_sha256, case.catalogs_sha256),
         )  # fmt: skip
+
+    def _cautions(self) -> tuple[str, ...]:
+        seen = [one.change for one in self.seen]
+        return tuple(cautions(self.ordered, self.doubted, self.changes, seen, self._stage))
 
     def _stage(self, index: int) -> str:
         return self.case.spec.stages[index].name
@@ -360,50 +364,6 @@ class Watching:
             one.spread,
             None if half is None else (one.value - half, one.value + half),
         )
-
-    def _cautions(self) -> Iterator[str]:
-        """What is odd in the last run or in the store, and no change of an effect."""
-        if not self.ordered:
-            return
-        if self.doubted is not None:
-            number = self.ordered[self.doubted].number
-            yield (
-                f"what the store kept of the look after run {number} is not what its runs say: "
-                "all looks were computed anew from the runs"
-            )
-        *earlier, last = self.ordered
-        run = last.run
-        if run.left_material:
-            yield (
-                f"run {last.number} ({run.files[0]}) is unexplained alone: something in it is not "
-                "in the dictionary, or the log contradicts itself; see `diagnose`"
-            )
-        for sensor, factor in run.white_factor.items():
-            own = [e.run.white_factor[sensor] for e in earlier if sensor in e.run.white_factor]
-            if own and factor > NOISIER * float(np.median(own)):
-                yield (
-                    f"noise of {sensor.replace('/', ', ')} in run {last.number} is "
-                    f"{to_digits(factor / float(np.median(own)), 2)} times that of the runs before"
-                )
-        yield from self._differing()
-
-    def _differing(self) -> Iterator[str]:
-        """Effects that have another value in every run: no change, and nothing to count on."""
-        told = {one.change.term.label for one in self.seen}
-        for found in self.changes.differing(len(self.ordered)):
-            term = found.named
-            if term.label in told:
-                continue
-            sizes = " and ".join(
-                format_estimate(float(to_digits(float(size), 2)), None, one.unit)
-                for size, one in zip(found.spread, term.effect.slopes(), strict=True)
-            )
-            words = f"{term.effect.name.replace('_', ' ')} ({term.sensor})"
-            yield (
-                f"{words} of {self._stage(term.stage)} "
-                f"has another value in every run: they differ by {sizes} (standard deviation) more "
-                "than noise, which is no change since a run, and no one value of the build"
-            )
 
 
 def _best(changes: Changes, look: int, table: Array, first: int, total: float) -> Seen:
