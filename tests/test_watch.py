@@ -394,3 +394,25 @@ def test_a_date_long_before_all_others_is_asked_about(
     said = told(spec, kept(spec, tmp_path, runs), tmp_path, 1)["cautions"]
     assert [one.startswith("run 6 (day-358.csv) is dated 2025-") for one in said] == [True] * odd
     assert all("358 days before all that were added before it" in one for one in said)
+
+
+@pytest.mark.parametrize("driven", [0, 1, 10])
+def test_runs_at_rest_are_no_all_clear(driven: int, spec: Path, tmp_path: Path) -> None:
+    """Parked for three days: a latency of any size could hide, and the store stays whole."""
+    rng, store = np.random.default_rng(41), tmp_path / "store.jsonl"
+    for day in range(driven + 3):
+        found = statistics(rng, 0.0 * BOUND, still=day >= driven)
+        add_run(store, "car", pinned_system(load(spec)), run_of(found, day))
+        looked(spec, store)
+    document = told(spec, store, tmp_path, 0)
+    assert not document["informative"]["ok"]
+    blind = {(b["effect"], b["sensor"]): b for b in document["informative"]["blind_to"]}
+    assert blind["latency", "position"]["smallest_seen"] is None
+    said = " ".join(watch(store, spec).output.split())
+    assert f"? Nothing seen to change, but run {driven + 3} shows no delay at all" in said
+    assert "it is blind to" in said
+    assert watch(store, spec, "--require-informative").exit_code == 3
+    add_run(store, "car", pinned_system(load(spec)), run_of(statistics(rng, 0.0 * BOUND), 20))
+    document = told(spec, store, tmp_path, 0)
+    assert "latency" not in {b["effect"] for b in document["informative"]["blind_to"]}
+    assert "shows no delay" not in watch(store, spec).output

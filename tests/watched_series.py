@@ -31,11 +31,15 @@ BOUND = UNITS / np.sqrt(ROWS)  # standard deviation of a parameter by one run, r
 FIRST = 1.79e9
 
 
-def statistics(rng: np.random.Generator, values: np.ndarray, alike: float = 0.0) -> Sufficient:
-    """Of a linear log with unit noise; alike: cosine of latency and the datum's north."""
+def statistics(
+    rng: np.random.Generator, values: np.ndarray, alike: float = 0.0, still: bool = False
+) -> Sufficient:
+    """Of a linear log with unit noise; alike: cosine of latency and the datum's north; still: a
+    vehicle at rest, which shows no latency."""
     columns = rng.standard_normal((ROWS, len(LABELS)))
     columns[:, 2] = alike * columns[:, 0] + np.sqrt(1.0 - alike**2) * columns[:, 2]
     columns /= UNITS
+    columns[:, 0] *= not still
     whole = np.column_stack([columns, columns @ values + rng.standard_normal(ROWS)])
     total = whole.T @ whole
     less = np.array([total - part.T @ part for part in np.split(whole, BLOCKS)])

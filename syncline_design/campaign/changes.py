@@ -258,6 +258,16 @@ class Changes:
         log_factor = float(self._factors(look)[k - 1, c])
         return Change(self.terms[c], k, inverse @ score, covariance, log_factor)
 
+    def tells(self, look: int) -> list[Array]:
+        """Of every effect the information (p, p) that `look` runs have about a change with the
+        last of them, by the scatter of runs and of their parts."""
+        found: list[Array] = [np.zeros((term.size, term.size)) for term in self.terms]
+        factor = self.temper(look)[-1]
+        for group, normal in zip(self.groups, self._freed(look)[0], strict=True):
+            for place, own in zip(group.terms, normal[-1], strict=True):
+                found[int(place)] = own / factor[place]
+        return found
+
     @cached_property
     def _last(self) -> dict[int, tuple[list[Array], list[Array]]]:
         return {}

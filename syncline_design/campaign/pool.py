@@ -75,12 +75,22 @@ class Pool:
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
-        """Every effect that some log knows of, its parameters in the order of its slopes."""
+        """Every effect that some log knows of."""
+        return tuple(term for term in self._listed if np.any(self.seen[:, term.index]))
+
+    @cached_property
+    def untold(self) -> tuple[Term, ...]:
+        """Every effect that the logs could have told of and none does, as of a vehicle at rest."""
+        return tuple(term for term in self._listed if not np.any(self.seen[:, term.index]))
+
+    @cached_property
+    def _listed(self) -> tuple[Term, ...]:
+        """All effects, their parameters in the order of their slopes."""
         found: dict[tuple[str, str, int], dict[str, int]] = {}
         for k, (name, sensor, stage, parameter) in enumerate(self.labels):
             found.setdefault((name, sensor, stage), {})[parameter] = k
         known = registry()
-        every = (
+        return tuple(
             Term(
                 known[name],
                 sensor,
@@ -92,7 +102,6 @@ class Pool:
             for (name, sensor, stage), at in sorted(found.items())
             if name in known
         )
-        return tuple(term for term in every if np.any(self.seen[:, term.index]))
 
     @cached_property
     def seen(self) -> NDArray[np.bool_]:

@@ -129,8 +129,12 @@ def _side_by_side(blocks: Array) -> Array:
 
 
 def _fitted(total: Array, score: Array) -> Array:
-    """g' T^-1 g - log|T| of several, columns scaled alike first; T of full rank."""
-    size = np.sqrt(np.diagonal(total[0]))
+    """g' T^-1 g - log|T| of several, columns scaled alike first.
+
+    What no run and no prior tells of, as of a vehicle at rest, adds the same to all of them.
+    """
+    known = np.diagonal(total[0])
+    size = np.sqrt(np.where(known > 0.0, known, 1.0))
     scaled = 0.5 * (total + np.swapaxes(total, -1, -2)) / (size[:, None] * size)
     scaled += ROUNDED * np.eye(size.size)  # effects that are one but for rounding
     root = np.linalg.cholesky(scaled)

@@ -11,8 +11,8 @@ import numpy as np
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
+from syncline_design.campaign.sight import limits_of
 from syncline_design.campaign.store import Entry, Stored
-from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import Weights, promise_of
 from syncline_design.diagnosis.finding import estimate, evidence_words, finding
 from syncline_design.diagnosis.gap_result import Remaining, WholeGap
@@ -248,11 +248,10 @@ def _seen(told: Told) -> Iterator[DetectionLimit]:
             continue
         fit = fitted(told.pool, (*told.named.fit.scoped, Scoped(term, "build")))
         judged = fit.judged(fit.place[-1][0])
-        size = _smallest(judged, math.log(rate))
-        effect, stage = term.effect, told.stages[term.stage]
-        entry = EffectEntry(effect.name, term.sensor, stage, tuple(zero_values(effect).items()))
-        for p, value in zip(effect.slopes(), size, strict=True):
-            yield DetectionLimit(entry, p.name, float(value), p.high)
+        yield from limits_of(term, told.stages, _smallest(judged, math.log(rate)))
+    for term in told.pool.untold:
+        if term.effect.name not in told.settings.exclude_effects:
+            yield from limits_of(term, told.stages)
 
 
 def _smallest(judged: Judged, log_p: float) -> Array:

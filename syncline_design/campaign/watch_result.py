@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from syncline_design.diagnosis.result import LogOutcome, SpecRead
+from syncline_design.diagnosis.result import NOT_SHOWN, Informative, LogOutcome, SpecRead
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.figure_text import to_digits
@@ -130,6 +130,7 @@ class Watch(Record):
     baseline_after: how many runs lie before the baseline that counts.  ordered_by: whether runs
     are in the order of their dates.  cautions: what is odd in the last run and no change.
     last: hash of the store's last line.  torn: bytes of a line that a kill had left.
+    informative: whether the last run could have shown a change that would turn the verdict.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -146,8 +147,14 @@ class Watch(Record):
     last: str
     torn: int
     provenance: WatchProvenance
+    informative: Informative
 
     @property
     def exit_code(self) -> int:
         """0 nothing changed, 1 something did."""
         return 1 if self.alarms else 0
+
+    def demanded_exit_code(self, *, informative: bool) -> int:
+        """The exit code; 3 where nothing changed in runs of which the last could not show it."""
+        hidden = informative and not self.alarms and not self.informative.ok
+        return NOT_SHOWN if hidden else self.exit_code

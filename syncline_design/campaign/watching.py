@@ -19,6 +19,7 @@ from syncline_design.campaign.looks import KeptLook, keys_of, known_first
 from syncline_design.campaign.oddities import cautions
 from syncline_design.campaign.pool import Pool, Term, pool_of
 from syncline_design.campaign.run_values import RunParameter, run_values
+from syncline_design.campaign.sight import sight
 from syncline_design.campaign.store import (
     Entry,
     Stored,
@@ -270,6 +271,7 @@ class Watching:
             baseline_after=stored.baselines[-1] if stored.baselines else 0,
             ordered_by="date" if dated else "adding",
             cautions=self._cautions(),
+            informative=sight(case, self.changes, len(self.ordered), self.request.rate),
             last=stored.last,
             torn=torn,
             provenance=WatchProvenance(__version__, case.spec_sha256, case.catalogs_sha256),

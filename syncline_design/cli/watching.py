@@ -50,6 +50,13 @@ def watch(
             help="Chance of a false alarm over all looks since a baseline.",
         ),
     ] = 0.05,
+    require_informative: Annotated[
+        bool,
+        typer.Option(
+            "--require-informative",
+            help="Exit with 3 where nothing changed but the last run could not have shown it.",
+        ),
+    ] = False,
     time_limit: TimeLimitOption = None,
 ) -> int:
     """Add a run to those of a system, and say what changed since when."""
@@ -75,7 +82,7 @@ def watch(
         found = watch_runs(case, request, DiagnosisSettings(seed=seed))
     emit(console(on_watch(found)), targets, lambda name: render_watch(name, found), quiet=quiet,
          charts=lambda: {"": on_watch(found)})  # fmt: skip
-    return found.exit_code
+    return found.demanded_exit_code(informative=require_informative)
 
 
 def _accept(store: Path, spec: Path | None, output: list[str] | None, *, quiet: bool) -> int:

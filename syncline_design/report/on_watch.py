@@ -78,6 +78,9 @@ def _outcome(found: Watch) -> Outcome:
     looks = _looks(found)
     if not found.alarms and looks < FEWEST_RUNS:
         return Outcome("warn", "?", f"Too few runs to tell ({looks} of {FEWEST_RUNS})")
+    if not found.alarms and _shows_no_delay(found):
+        last = _compared(found)[-1].run
+        return Outcome("warn", "?", f"Nothing seen to change, but run {last} shows no delay at all")
     if not found.alarms:
         return Outcome("good", "\u2713", f"Nothing changed in {looks} run{'s'[: looks != 1]}")
     first = found.alarms[0]
@@ -111,6 +114,28 @@ def _sentences(found: Watch) -> Iterator[Inline]:
             "that even a large change may not ring yet. What each says alone is in the table of "
             "runs."
         )
+    if not found.alarms and not found.informative.ok:
+        yield _blind(found)
+
+
+def _shows_no_delay(found: Watch) -> bool:
+    """Whether a delay of any size would go unseen in the last run, as of a vehicle at rest."""
+    known = registry()
+    return any(
+        one.smallest_seen is None and known[one.effect].breaks == "latency"
+        for one in found.informative.blind_to
+    )
+
+
+def _blind(found: Watch) -> str:
+    """`Run 13 (P13.csv) could not have shown ...`."""
+    last = _compared(found)[-1]
+    names = sorted({f"{one.effect.replace('_', ' ')} ({one.sensor})"
+                    for one in found.informative.blind_to})  # fmt: skip
+    return (
+        f"Run {last.run} ({last.files[0]}) could not have shown every change that would turn a "
+        f"requirement: it is blind to {sentence_list(names)}."
+    )
 
 
 def _sentence(one: Alarm) -> str:
