@@ -107,6 +107,14 @@ def test_a_quantity_in_two_files_is_said(tmp_path: Path) -> None:
     assert log.stages[0].range_m == pytest.approx(read(one).stages[0].range_m)
 
 
+def test_a_second_whole_log_is_no_part_of_the_first(tmp_path: Path) -> None:
+    """Its rows would be left out in silence: several runs are not one."""
+    files = [write(tmp_path / name, columns()) for name in ("a.csv", "b.csv")]
+    with pytest.raises(BadInput, match=r"a second log of .* that are in a.csv already") as found:
+        read_log(files, ["uav"])
+    assert "--joint" in str(found.value)
+
+
 def test_a_mapping_of_what_is_no_column_is_refused_at_its_line(tmp_path: Path) -> None:
     text = (ROOT / "examples" / "hidden_latency.yaml").read_text(encoding="utf-8")
     spec = tmp_path / "spec.yaml"

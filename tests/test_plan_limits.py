@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import syncline_design as sd
 from syncline_design.planning.drives import outcome
 from syncline_design.planning.legs import MOST_LEG_S, library, transition
-from syncline_design.planning.path import STEP_S, joined, travelled
+from syncline_design.planning.path import STEP_S, CourseCommands, joined, travelled, unasked
 from syncline_design.planning.run import plan as planned
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.telling import PlanRun, Telling
@@ -290,3 +290,23 @@ def test_a_vehicle_without_a_leg_is_refused(tmp_path: Path) -> None:
     words = " ".join(done.stderr.split())
     assert "no leg takes less than 300 s" in words
     assert "v_max and acceleration" in words
+
+
+@pytest.mark.parametrize("motion", ["surface", "ground", "underwater", "multirotor"])
+def test_what_moves_a_vehicle_unasked_is_said(tmp_path: Path, motion: str) -> None:
+    """Held straight on, it rolls, pitches and heaves by what the plan says that it counts on."""
+    spec = spec_with(tmp_path, ("motion: multirotor", f"motion: {motion}"))
+    (vehicle,) = vehicles(load(spec), ("lidar",))
+    steps = round(4000.0 / STEP_S)
+    still = np.zeros(steps)
+    states = travelled(vehicle, CourseCommands(np.full(steps, 3.0), still, still, still))
+    roll, pitch = (f"{np.degrees(np.std(states.euler_rad[:, k])):.2g} deg" for k in (0, 1))
+    said = unasked(vehicle)
+    if motion == "multirotor":
+        assert said is None
+        return
+    assert said is not None
+    assert roll in said
+    assert pitch in said
+    heave = np.std(states.position_m[:, 2])
+    assert (f"{100.0 * heave:.2g} cm" in said) == (motion == "surface")

@@ -63,6 +63,15 @@ def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
             continue
         taken = {k: v for k, v in table.columns.items() if k not in columns and k != TIME}
         twice = sorted(shown(k) for k in table.columns if k in columns and k != TIME)
+        if base.columns.keys() <= table.columns.keys():
+            raise refuse(
+                table.path,
+                "it tells nothing that the files before it do not tell",
+                expected="files that are parts of one run, each with columns of its own",
+                found=f"a second log of {len(twice)} columns that are in {base.path.name} already",
+                hint="several runs of one system are taken together by `diagnose --joint`; `plan "
+                "--flown` asks for one drive at a time",
+            )
         if twice:
             notes.append(
                 f"{table.path.name}: not read, as another file gives it: {', '.join(twice)}"

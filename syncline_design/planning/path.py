@@ -16,12 +16,14 @@ import numpy as np
 from syncline_design.effects.kinematics import euler_to_rotation, rotate
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.planning.vehicle import GRAVITY_MPS2, SEA_RATE_SHARE, SEA_TILT, Vehicle
 
 STEP_S = 0.05
 SEA_HZ = (0.09, 0.13, 0.16, 0.21)  # swell and wind sea
 ROLL_SHARE, PITCH_SHARE = 1.0, 0.5  # of the sea's tilt
 ROAD_RAD = 0.006  # how far a road or a current tilts a vehicle, rms
+SEA_HEAVE_M = 0.15
 PHASES = (0.3, 2.1, 4.4, 5.6)
 
 
@@ -147,11 +149,37 @@ def _sea(vehicle: Vehicle, time_s: Array) -> tuple[Array, Array, Array]:
     The largest is taken for three standard deviations; the turn rate stays a small part of
     omega_max.
     """
-    rate = 2.0 * np.pi * float(np.sqrt(np.mean(np.square(SEA_HZ))))
-    std = min(vehicle.tilt_rad / SEA_TILT, SEA_RATE_SHARE * vehicle.omega_max_radps / rate)
+    std = sea_tilt_rad(vehicle.tilt_rad, vehicle.omega_max_radps)
     roll = ROLL_SHARE * std * _swell(time_s, 1.0)
     pitch = PITCH_SHARE * std * _swell(time_s, 1.13)
-    return roll, pitch, 0.15 * _swell(time_s, 0.91)
+    return roll, pitch, SEA_HEAVE_M * _swell(time_s, 0.91)
+
+
+def sea_tilt_rad(tilt_rad: float, omega_max_radps: float) -> float:
+    """Standard deviation of the sea's tilt."""
+    rate = 2.0 * np.pi * float(np.sqrt(np.mean(np.square(SEA_HZ))))
+    return min(tilt_rad / SEA_TILT, SEA_RATE_SHARE * omega_max_radps / rate)
+
+
+def unasked(vehicle: Vehicle) -> str | None:
+    """What moves a vehicle besides its commands, in words: the drive counts on it."""
+    match vehicle.motion:
+        case "surface":
+            tilt = sea_tilt_rad(vehicle.tilt_rad, vehicle.omega_max_radps)
+            roll, pitch = (f"{to_digits(np.degrees(share * tilt), 2)} deg"
+                           for share in (ROLL_SHARE, PITCH_SHARE))  # fmt: skip
+            return (
+                f"waves that roll it by {roll}, pitch it by {pitch} and heave it by "
+                f"{to_digits(100.0 * SEA_HEAVE_M, 2)} cm (standard deviations); in calm water the "
+                "drive tells less"
+            )
+        case "ground" | "underwater":
+            moved = "a road" if vehicle.motion == "ground" else "currents"
+            size = to_digits(np.degrees(ROAD_RAD), 2)
+            verb = "rolls and pitches" if vehicle.motion == "ground" else "roll and pitch"
+            return f"{moved} that {verb} it by {size} deg (standard deviation)"
+        case _:
+            return None
 
 
 def _uneven(time_s: Array) -> tuple[Array, Array]:

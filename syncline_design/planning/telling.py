@@ -28,7 +28,7 @@ from syncline_design.planning.information import (
     fisher,
     sigmas,
 )
-from syncline_design.planning.path import PathStates
+from syncline_design.planning.path import PathStates, unasked
 from syncline_design.planning.planned_log import Drive
 from syncline_design.planning.result import (
     After,
@@ -355,9 +355,12 @@ def _noise_words(world: World) -> str:
 
 def _assumed(world: World) -> tuple[str, ...]:
     several = len(world.vehicles) > 1
-    return tuple(
-        f"{v.stage}: {words}" if several else words for v in world.vehicles for words in v.assumed
+    every = (
+        (v.stage, words)
+        for v in world.vehicles
+        for words in (*v.assumed, *filter(None, (unasked(v),)))
     )
+    return tuple(f"{stage}: {words}" if several else words for stage, words in every)
 
 
 def columns_needed(system: System) -> tuple[str, ...]:
