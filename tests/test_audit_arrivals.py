@@ -202,6 +202,28 @@ def test_waits_as_long_as_an_interval(tmp_path: Path, law: str, share: float) ->
     assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.1)
 
 
+@pytest.mark.parametrize(("rate", "seed"), [(8.0, 51), (15.0, 52), (45.0, 53)])
+def test_arrivals_with_a_heavy_tail_are_named_beside_receipts_that_scatter(
+    tmp_path: Path, rate: float, seed: int
+) -> None:
+    """Most delays of such a tail are hardly longer than receipts scatter; the others tell."""
+    rng = np.random.default_rng(seed)
+    t = even(rate, 1800.0 / rate)
+    stamp = np.maximum.accumulate(t + 1e-3 + 1e-3 * rng.pareto(2.2, t.size))
+    receive = np.maximum.accumulate(stamp + 5e-5 + rng.gamma(2.0, 1e-4, t.size))
+    row = said(tmp_path, stamp, receive)
+    assert set(found(row)) == {"stamped_on_arrival"}
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.1)
+
+
+def test_stamps_of_the_sensor_whose_transport_has_a_heavy_tail_are_sound(tmp_path: Path) -> None:
+    rng = np.random.default_rng(54)
+    t = even(15.0, 120.0)
+    stamp = t + rng.gamma(2.0, 1e-4, t.size)
+    receive = np.maximum.accumulate(stamp + 1e-3 + 1e-3 * rng.pareto(2.2, t.size))
+    assert not found(said(tmp_path, stamp, receive))
+
+
 def test_waits_as_long_as_an_interval_from_some_message_on(tmp_path: Path) -> None:
     rng = np.random.default_rng(36)
     t = even(50.0, 70.0)

@@ -26,6 +26,8 @@ _EVENER: Final = 0.3  # how much more even stamps of the sensor's own are
 _WHOLE_SCANS: Final = 1.25  # how far from its stamp a point of a scan may lie, in scans
 _ONE_TICK: Final = 0.9  # of an interval
 _CLOCKS: Final = 1e-4  # that a sensor's clock and a timer's differ by
+_OUTER: Final = 5.0  # per cent of the messages beyond either end of a scatter's reach
+_OUTERS: Final = (25.0, _OUTER)
 _SKEWED: Final = 0.2  # how much further the late half of the rhythm's scatter reaches
 
 
@@ -47,7 +49,7 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
         return StampFault("stamped_on_arrival", {}, None, None,
                           "every stamp equals its receipt")  # fmt: skip
     transport = _width(late)
-    late_ones = _scattered(about, transport) or _waited(without_losses(when, pace), transport)
+    late_ones = _scattered(about, late) or _waited(without_losses(when, pace), late)
     return late_ones or _in_frames(when, transport)
 
 
@@ -56,32 +58,32 @@ def _when(series: Series, pace: Cadence) -> Array:
     return seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
 
 
-def _scattered(about: Array | None, transport_s: float) -> StampFault | None:
+def _scattered(about: Array | None, late: Array) -> StampFault | None:
     """By a scatter about the rhythm that is late rather than early."""
     if about is None or not _one_sided(about):
         return None
     own = spread(about)
-    if own < _LEAST_JITTER_S or transport_s > _TIGHT * own:
+    if own < _LEAST_JITTER_S or not _follow(late, about):
         return None
     return StampFault(
         "stamped_on_arrival", {"seconds": own}, None, None,
         f"stamps scatter by {in_words(own)} about the sensor's rhythm, late rather than early, "
-        f"while receipts follow within {in_words(transport_s)}: they say when messages came",
+        f"while receipts follow within {in_words(_width(late))}: they say when messages came",
     )  # fmt: skip
 
 
-def _waited(when: Array, transport_s: float) -> StampFault | None:
+def _waited(when: Array, late: Array) -> StampFault | None:
     """By delays as long as the sensor's interval: none before its turn, many after."""
     waits = waits_of(when)
     if waits is None or not waits.late:
         return None
     own = spread(waits.about_s)
-    if own < _LEAST_JITTER_S or transport_s > _TIGHT * own:
+    if own < _LEAST_JITTER_S or not _follow(late, waits.about_s):
         return None
     return StampFault(
         "stamped_on_arrival", {"seconds": own}, None, None,
         f"stamps come up to {in_words(waits.reach_s)} after the sensor's turn, never before it, "
-        f"and receipts follow within {in_words(transport_s)}: they say when messages came",
+        f"and receipts follow within {in_words(_width(late))}: they say when messages came",
     )  # fmt: skip
 
 
@@ -252,9 +254,25 @@ def _width(late: Array) -> float:
     return float(min(spread(late), spread(np.diff(late))))
 
 
+def _follow(late: Array, about: Array) -> bool:
+    """Whether receipts follow stamps far more closely than these follow the rhythm.
+
+    Over the middle half of the messages, or over the reach of more of them: delays of a heavy tail
+    have a narrow middle, against which the noise of receipts is not small.
+    """
+    return any(_range(late, outer) <= _TIGHT * _range(about, outer) for outer in _OUTERS)
+
+
+def _range(values: Array, outer: float) -> float:
+    """Between the percentiles outer and 100 - outer, blind to slow changes of the level."""
+    ranges = (np.subtract(*np.percentile(v, [100.0 - outer, outer])) for v in
+              (values, np.diff(values)))  # fmt: skip
+    return float(min(ranges))
+
+
 def _one_sided(about: Array) -> bool:
     """Whether the late half of a scatter reaches further than the early one."""
-    low, middle, high = np.percentile(about, [5, 50, 95])
+    low, middle, high = np.percentile(about, [_OUTER, 50.0, 100.0 - _OUTER])
     reach = high - low
     return bool(reach > 0.0 and (high - middle) - (middle - low) > _SKEWED * reach)
 

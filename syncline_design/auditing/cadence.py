@@ -167,13 +167,14 @@ def about_rhythm(when: Array) -> Array | None:
 
 def missing(
     series: Series, pace: Cadence, level_s: float, *, blurred: bool = False,
-    count: Counted | None = None,
+    count: Counted | None = None, arrived: bool = False,
 ) -> tuple[StampFault, ...]:  # fmt: skip
     """Gaps and single losses: stamps and receipts leave out what should have come.
 
     level_s: scatter of receipts minus stamps; an interval that only the stamps show is a step.
     blurred: stamps are too coarse, or scatter too much, to tell a late message from a lost one.
-    count: how the messages of coarse stamps were counted instead.
+    count: how the messages of coarse stamps were counted instead.  arrived: stamps are of arrival,
+    so that one that waited leaves an interval that the next makes good for.
     """
     if pace.interval.size < _LEAST_INTERVALS or pace.period_s <= 0.0:
         return ()
@@ -182,7 +183,7 @@ def missing(
         level_s = max(level_s, count.tick_s)  # within a tick receipts and stamps differ anyhow
         lost = _of_both(series, pace, _beside_unusable(count.lost, pace), level_s)
     else:
-        lost = _lost(series, pace, level_s) if pace.regular else _holes(pace)
+        lost = _lost(series, pace, level_s, late=arrived) if pace.regular else _holes(pace)
         lost[pace.interval < _BEYOND * _about(pace.interval)] = 0.0
     if not lost.any():
         return ()
@@ -217,7 +218,7 @@ def _about(interval: Array) -> Array:
     return np.asarray(np.delete(near, _NEXT, axis=1).min(axis=1))
 
 
-def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
+def _lost(series: Series, pace: Cadence, level_s: float, *, late: bool) -> Array:
     """Missing messages of every interval, those taken out as unusable not counted."""
     between = np.diff(pace.places) - 1.0
     lost = np.maximum(pace.steps - 1.0 - between, 0.0)
@@ -225,7 +226,7 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
     lost = _of_both(series, pace, lost, level_s)
     off = np.abs(pace.interval - pace.steps * pace.period_s)
     lost[off > np.maximum(_PLACED * pace.period_s, 0.02 * pace.interval)] = 0.0
-    if pace.jitter_s > _UNEVEN * pace.period_s:
+    if late or pace.jitter_s > _UNEVEN * pace.period_s:
         for k in np.flatnonzero(lost):
             if not _stays(series, pace, int(k)):
                 lost[k] = 0.0

@@ -326,10 +326,13 @@ def _last(
     packets = "packetised" in names
     coarse = grain is not None and (packets or grain.size_s > _COARSE * pace.period_s)
     count = counted_behind(series, names, grain.size_s) if grain is not None and coarse else None
+    arrived_so = [f for f in found if f.fault == "stamped_on_arrival" and f.from_s is None]
     late = any(_blurs(f, pace) for f in found if f.fault == "stamped_on_arrival")
     blurred = late or (coarse and count is None)
     shown = replace(pace, regular=False) if packets and count is None else pace  # holes alone
-    found += missing(series, shown, level_scatter(series), blurred=blurred, count=count)
+    found += missing(
+        series, shown, level_scatter(series), blurred=blurred, count=count, arrived=bool(arrived_so)
+    )
     if not names & LATE_OR_COARSE:
         arrived = arrival.stamped_on_arrival(series, pace)
         found += [arrived] if arrived is not None else []
