@@ -18,6 +18,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.constants import ANOTHER
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.judged import Judged
@@ -323,7 +324,15 @@ def _unlike(common: Fitted, separate: Fitted, k: int, temper: float) -> float:
 
 
 def plausible(model: Fitted) -> bool:
-    """Whether every value is one that its effect can have."""
+    """Whether every value is one that its effect can have, and one that the logs tell of it.
+
+    What has next to no information apart from the others is told of by noise in the readings that
+    the slopes are made of: at rest on one heading an arm and a datum undo one another by metres.
+    """
+    own = np.diag(model.normal)
+    apart = 1.0 / np.maximum(np.diag(model.inverse) * own, 1.0)
+    if any(np.max(apart[place]) < ANOTHER for place in model.place):
+        return False
     for one, place in zip(model.scoped, model.place, strict=True):
         for k, p in enumerate(one.term.effect.slopes()):
             values: Array = model.values[place[:, k]]
