@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import find_peaks
 from scipy.spatial.transform import Rotation
 
 import syncline_design as sd
@@ -310,3 +311,40 @@ def test_what_moves_a_vehicle_unasked_is_said(tmp_path: Path, motion: str) -> No
     assert pitch in said
     heave = np.std(states.position_m[:, 2])
     assert (f"{100.0 * heave:.2g} cm" in said) == (motion == "surface")
+
+
+@pytest.mark.parametrize(
+    ("motion", "v_max_mps", "omega_max"),
+    [("multirotor", 8.0, 40.0), ("ground", 3.0, 25.0), ("ground", 20.0, 0.5), ("surface", 4.0, 9.0),
+     ("underwater", 1.5, 12.0), ("fixed_wing", 25.0, 30.0)],
+)  # fmt: skip
+def test_words_of_swings_are_what_is_driven(
+    tmp_path: Path, motion: str, v_max_mps: float, omega_max: float
+) -> None:
+    """Speeds between the first and the last peak, and how far the heading swings, as the path has
+    them; a heading that swings by less than a driver sees is no slalom."""
+    spec = spec_with(
+        tmp_path,
+        ("motion: multirotor", f"motion: {motion}"),
+        ("v_max: 9 m/s, omega_max: 50 deg/s",
+         f"v_max: {v_max_mps} m/s, omega_max: {omega_max} deg/s"),
+        (", area: [250 m, 250 m]", ""),
+    )  # fmt: skip
+    (vehicle,) = vehicles(load(spec), ("lidar",))
+    legs = {leg.name: leg for leg in library(vehicle, 0)}
+    if leg := legs.get("slow and fast circle"):
+        speed = np.linalg.norm(travelled(vehicle, leg.course).velocity_mps[:, :2], axis=1)
+        fast, slow = (
+            float(word.split()[0])
+            for word in (leg.words.split("three times up to ")[1], leg.words.split("down to ")[1])
+        )
+        first, last = find_peaks(speed)[0][[0, -1]]
+        assert fast == pytest.approx(np.max(speed[first : last + 1]), rel=6e-3)
+        assert slow == pytest.approx(np.min(speed[first:last]), rel=6e-3)
+    if (leg := legs.get("slalom")) and motion != "fixed_wing":
+        yaw = np.degrees(np.unwrap(travelled(vehicle, leg.course).euler_rad[:, 2]))
+        told = float(leg.words.split("swings through ")[1].split()[0])
+        assert told == pytest.approx(np.ptp(yaw), rel=0.06)
+        assert told >= 2.0
+        assert np.argmax(np.abs(yaw) > 0.2 * np.ptp(yaw)) == np.argmax(yaw > 0.2 * np.ptp(yaw))
+    assert ("slalom" in legs) == (omega_max > 1.0)

@@ -14,7 +14,7 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
-from syncline_design.planning.path import STEP_S, CourseCommands
+from syncline_design.planning.path import STEP_S, CourseCommands, rounded
 from syncline_design.planning.vehicle import GRAVITY_MPS2, Vehicle
 
 LINE_S = 20.0
@@ -187,11 +187,19 @@ def _swinging_circle(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if quarters < 1:
         return None
     radius = length / (quarters * QUARTER_RAD)
+    slow, fast = _between_peaks(rounded(v, ahead))
     words = (
-        f"on a circle to the right of {to_digits(radius, 2)} m radius, three times from "
-        f"{_mps(low)} up to {_mps(high)} and back, {90 * quarters} deg in all"
+        f"on a circle to the right of {to_digits(radius, 2)} m radius, three times up to "
+        f"{_mps(fast)}, down to {_mps(slow)} in between, {90 * quarters} deg in all"
     )
     return words, _course(ahead, turn=ahead / radius)
+
+
+def _between_peaks(speed: Array) -> tuple[float, float]:
+    """The slowest and the fastest of three swings, without what leads up to them and away."""
+    peaks = np.flatnonzero((speed[1:-1] > speed[:-2]) & (speed[1:-1] >= speed[2:])) + 1
+    inside = speed[peaks[0] : peaks[-1] + 1]
+    return float(inside.min()), float(inside.max())
 
 
 def _turning_speed(v: Vehicle) -> float:
@@ -202,6 +210,7 @@ def _turning_speed(v: Vehicle) -> float:
 
 
 TURNS_WELL = 0.5
+LEAST_SLALOM_DEG = 2.0  # swings of the heading below it are a straight line to a driver
 
 
 def _eight(v: Vehicle) -> tuple[str, CourseCommands]:
@@ -244,7 +253,7 @@ def _sway(v: Vehicle, sideways: bool) -> tuple[str, CourseCommands] | None:
 
 
 def _rock(v: Vehicle) -> tuple[str, CourseCommands] | None:
-    """Turns to and fro: an aeroplane rolls, others yaw."""
+    """Turns to and fro: an aeroplane rolls, others yaw, by enough for a driver to see it."""
     speed = v.join_mps if v.motion == "fixed_wing" else _turning_speed(v)
     rate, cycles = v.turn_radps(speed), 4
     period = max(3.0, 4.0 * v.rounding_s, SWEEP_S / cycles)
@@ -253,8 +262,18 @@ def _rock(v: Vehicle) -> tuple[str, CourseCommands] | None:
     turn = np.zeros_like(ahead)
     at = (len(ahead) - len(swing)) // 2
     turn[at : at + len(swing)] = swing
-    what = "roll sweeps: rock the wings" if v.motion == "fixed_wing" else "a slalom"
-    words = f"{what} at {_mps(speed)}, {cycles} times to either side, {to_places(period, 0)} s each"
+    each = f"{cycles} times, {to_places(period, 0)} s each"
+    if v.motion == "fixed_wing":
+        return f"roll sweeps: rock the wings at {_mps(speed)} to either side, {each}", _course(
+            ahead, turn=turn
+        )
+    heading = math.degrees(float(np.ptp(np.cumsum(rounded(v, turn)) * STEP_S)))
+    if heading < LEAST_SLALOM_DEG:
+        return None
+    words = (
+        f"a slalom at {_mps(speed)}: the heading swings through {to_digits(heading, 2)} deg, first "
+        f"to the right, {each}"
+    )
     return words, _course(ahead, turn=turn)
 
 

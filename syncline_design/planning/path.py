@@ -80,19 +80,20 @@ class PathStates:
         return PathStates(time_s, *np.split(found, 5, axis=1))
 
 
+def rounded(vehicle: Vehicle, command: Array) -> Array:
+    """What becomes of a command: no vehicle changes its speed or its turn at once."""
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(command, vehicle.rounding_s / STEP_S, mode="nearest"))
+
+
 def travelled(
     vehicle: Vehicle, course: CourseCommands, heading_rad: float = 0.0, start_s: float = 0.0
 ) -> PathStates:
     """The motion that a course makes, from the origin; start_s: since when the sea moves."""
-    from scipy.ndimage import gaussian_filter1d
-
-    def rounded(values: Array) -> Array:
-        smooth = vehicle.rounding_s / STEP_S
-        return np.asarray(gaussian_filter1d(values, smooth, mode="nearest"))
-
     time_s = start_s + STEP_S * np.arange(len(course), dtype=np.float64)
     ahead, right, down, turn = (
-        rounded(v) for v in (course.ahead, course.right, course.down, course.turn)
+        rounded(vehicle, v) for v in (course.ahead, course.right, course.down, course.turn)
     )
     yaw = heading_rad + _integral(turn)
     velocity = np.stack(
