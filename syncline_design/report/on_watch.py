@@ -231,9 +231,9 @@ def _effects(found: Watch) -> list[Node]:
         key=lambda key: (key not in since, key),
     )
     caption = (
-        "Each parameter as every run alone tells it, with its 95 % interval; all others are held at "
-        "what the runs together name, and at nothing where they name nothing. A vertical line where "
-        "a change began."
+        "Each parameter as every run alone tells it, with its 95 % interval; all others are held "
+        "at what the runs together name, and at nothing where they name nothing. A vertical line "
+        "where a change began."
     )
     changed = [key for key in keys if key in since]
     rest = [key for key in keys if key not in since]
