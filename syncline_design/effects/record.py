@@ -364,6 +364,11 @@ class Effect:
         """Whether it is noise that is correlated in time."""
         return self.opens in ("slow", "down")
 
+    @property
+    def delays(self) -> bool:
+        """Whether it makes a sensor late, which shows only where something moves."""
+        return self.breaks == "latency"
+
     def misfits(self, sensor: str, values: Mapping[str, float | str]) -> Iterator[Misfit]:
         """Why the effect cannot act so on a sensor, with these parameters."""
         if sensor not in self.sensors:

@@ -122,8 +122,7 @@ def _shows_no_delay(found: Watch) -> bool:
     """Whether a delay of any size would go unseen in the last run, as of a vehicle at rest."""
     known = registry()
     return any(
-        one.smallest_seen is None and known[one.effect].breaks == "latency"
-        for one in found.informative.blind_to
+        one.smallest_seen is None and known[one.effect].delays for one in found.informative.blind_to
     )
 
 
