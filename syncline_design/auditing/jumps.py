@@ -52,6 +52,7 @@ _LEAST_S: Final = 2e-5
 _WHOLE_S: Final = 1e-4  # how near to whole seconds a slip of a sensor's pulse is
 _CHANCE: Final = 12.0  # of the delays' spread: so late a queue may make messages
 _QUEUE: Final = 64  # messages, which hardly a queue holds up
+_LOADED: Final = 4096  # messages, of which no load of a host holds up all
 _SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
 _BACK: Final = 0.3  # of a jump: what returns by more settles, and is no step
 _LEAST_SETS: Final = 6  # jumps that come in a beat
@@ -66,13 +67,15 @@ _SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in qu
 class Jump:
     """Stamps gain `size_s` with the message at `place` (among the good ones), until `end`.
 
-    again: one of many by one size, of a clock that is set again and again.
+    again: one of many by one size, of a clock that is set again and again.  doubted: by whole
+    intervals, and only messages near it show it.
     """
 
     place: int
     size_s: float
     end: int | None = None
     again: bool = False
+    doubted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +99,7 @@ def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
     found = _found(pace, late, least_s)
     if not found or len(found) > _MOST_JUMPS:
         return nothing
-    lasting = _lasting(found, times, late)
+    lasting = _lasting(found, times, late, pace)
     settling = tuple(float(times[j.place]) for j in found if j not in lasting)
     lasting = [j for j in lasting if not _went_on(j, [s for s in found if s not in lasting], pace)]
     found = _paired(lasting, pace.jitter_s)
@@ -137,7 +140,13 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
     found = _sizes(pace, late, odd, edges, off_here, (width, floor))
     equal = _equal(pace, late, odd[off_here[odd]], (width, floor))
     alone = {jump.place for jump in equal}
-    return sorted([*equal, *(j for j in found if j.place not in alone)], key=lambda j: j.place)
+    found = [j for j in found if j.place not in alone and (not j.doubted or _goes_back(j, found))]
+    return sorted([*equal, *found], key=lambda j: j.place)
+
+
+def _goes_back(jump: Jump, found: list[Jump]) -> bool:
+    """Whether another takes it back, which lost messages never do."""
+    return any(abs(one.size_s + jump.size_s) < _EQUAL * abs(jump.size_s) for one in found)
 
 
 def _equal(
@@ -240,7 +249,9 @@ def _sizes(
             continue  # receipts jumped where messages are lost: stamps keep their rhythm
         chance = whole and abs(size) < _CHANCE * width
         if not chance or abs(size + _floor(*sides)) < alike:
-            found.append(Jump(int(k) + 1, size if uneven < 2.0 * sure else -moved))
+            doubted = chance and abs(size + _loaded_floor(*sides)) >= alike - sure
+            size = size if uneven < 2.0 * sure else -moved
+            found.append(Jump(int(k) + 1, size, doubted=doubted))
     return found
 
 
@@ -253,7 +264,13 @@ def _floor(before: Array, after: Array) -> float:
     return float(other - one)
 
 
-def _lasting(found: list[Jump], times: Array, late: Array) -> list[Jump]:
+def _loaded_floor(before: Array, after: Array) -> float:
+    """By how much the quickest of very many are later: a load of the host holds up hundreds by
+    more than an interval, and not all of thousands."""
+    return float(after[:_LOADED].min() - before[-_LOADED:].min())
+
+
+def _lasting(found: list[Jump], times: Array, late: Array, pace: Cadence) -> list[Jump]:
     """Those after which the level stays, but for a drift of the whole log: the others settle."""
     level = late.copy()
     for jump in found:
@@ -261,7 +278,22 @@ def _lasting(found: list[Jump], times: Array, late: Array) -> list[Jump]:
     level = level - _slope(times, level) * (times - times[0])
     ends = [*(jump.place for jump in found[1:]), late.size]
     both = zip(found, ends, strict=True)
-    return [j for j, end in both if j.again or not _settles(j, level[j.place : end])]
+    return [
+        j
+        for j, end in both
+        if j.again or _kept_pace(j, end, pace) or not _settles(j, level[j.place : end])
+    ]
+
+
+def _kept_pace(jump: Jump, end: int, pace: Cadence) -> bool:
+    """Whether the stamps after it went on as evenly as before, to less than what settling takes
+    back: a clock that is slewed home stretches the sensor's intervals by as much."""
+    apart = abs(jump.size_s - round(jump.size_s / pace.period_s) * pace.period_s)
+    if apart < _BROKEN * pace.period_s:
+        return False  # by whole intervals, which nobody counts
+    own = slice(jump.place, end - 1)
+    off = np.cumsum(pace.interval[own] - pace.steps[own] * pace.period_s)
+    return off.size >= _BESIDE and float(np.ptp(off)) < _BACK * abs(jump.size_s)
 
 
 def _went_on(jump: Jump, settling: list[Jump], pace: Cadence) -> bool:

@@ -1,0 +1,70 @@
+"""Sensors of an exact rhythm behind a host that is loaded now and then: stamps tell what happened.
+
+Delays are gamma distributed, five times as long in episodes of seconds, so that the middle of the
+messages on either side of one says little; the quickest of many do, and an interval that breaks a
+rhythm of nanoseconds.  Streams are this file's own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from stamped_streams import of
+from syncline_design.auditing.series import Array
+from syncline_design.auditing.stream import Examined
+
+
+def delays(rng: np.random.Generator, time_s: Array) -> Array:
+    """Gamma of shape 1.7 and scale 1.2 ms, five times as long for 40 % of every 15 to 40 s."""
+    found = 1e-4 + rng.gamma(1.7, 1.2e-3, time_s.size)
+    begin = rng.uniform(0.0, 10.0)
+    while begin < time_s[-1]:
+        period = rng.uniform(15.0, 40.0)
+        found[(time_s >= begin) & (time_s < begin + 0.4 * period)] *= 5.0
+        begin += period
+    return np.asarray(found)
+
+
+def stream(rng: np.random.Generator, rate_hz: float, time_s: float = 140.0) -> tuple[Array, Array]:
+    """Times of measuring, and receipts that keep their order."""
+    at = np.arange(0.0, time_s, 1.0 / rate_hz)
+    return at, np.maximum.accumulate(at + delays(rng, at))
+
+
+def named(found: Examined) -> list[tuple[str, float]]:
+    return [(f.fault, f.parameters.get("seconds", f.parameters.get("count", 0.0)))
+            for f in found.faults]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", [0, 4, 11])
+@pytest.mark.parametrize(("rate_hz", "step_s"), [(31.0, -0.012), (25.0, -0.015)])
+def test_a_step_is_told_by_the_interval_that_breaks(
+    rate_hz: float, step_s: float, seed: int
+) -> None:
+    rng = np.random.default_rng([71, seed])
+    stamp, receive = stream(rng, rate_hz)
+    late = stamp >= rng.uniform(30.0, 110.0)
+    ((fault, size),) = named(of(stamp + step_s * late, receive))
+    assert fault == "step"
+    assert size == pytest.approx(step_s, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("rate_hz", [140.0, 180.0, 240.0])
+def test_lost_messages_are_no_steps_of_the_clock(rate_hz: float, seed: int) -> None:
+    """A message in 300 is missing: every odd interval is two of the sensor's."""
+    rng = np.random.default_rng([73, seed])
+    stamp, receive = stream(rng, rate_hz)
+    kept = rng.random(stamp.size) > 1.0 / 300.0
+    kept[[0, -1]] = True
+    ((fault, count),) = named(of(stamp[kept], receive[kept]))
+    assert fault == "lost_messages"
+    assert count == np.sum(~kept)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_loaded_host_alone_is_no_fault(seed: int) -> None:
+    rng = np.random.default_rng([79, seed])
+    for rate_hz in (31.0, 180.0):
+        assert named(of(*stream(rng, rate_hz))) == []
