@@ -1,12 +1,12 @@
 """Whether what begins somewhere in a log has the form that its name claims: a step is no ramp,
 and before it there is none of it.
 
-Beside a step the same shape, growing with time all along the log, has to be nothing: what drifts
-looks like a step in the middle, and a step's size alone does not tell.  Judged beside the slow
-states, so that noise which is larger or slower than the spec's does not refute a step; stretches
-left out in turn have no say, as only a few at the ends tell a ramp from a step.  The rows before a
-step have to speak against its having been there from the start, and to pay for its place: a delay
-that may not be named passes for a step as early as one is looked for.
+Beside a step and a constant the same shape, growing with time all along the log, has to be
+nothing: what drifts looks like a step in the middle, and a step's size alone does not tell.
+Judged beside the slow states, so that noise which is larger or slower than the spec's does not
+refute a step; stretches left out in turn have no say, as only a few at the ends tell a ramp from a
+step.  The rows before a step have to speak against its having been there from the start, and
+to pay for its place: a delay that may not be named passes for a step as early as one is looked for.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Final
 
 from syncline_design.campaign.watch_result import Alarm, Watch, WatchedRun, e_value_text
+from syncline_design.diagnosis.result import BlindSpot
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
@@ -93,7 +94,7 @@ def _looks(found: Watch) -> int:
     return len([r for r in found.runs if r.run > found.baseline_after])
 
 
-def _name(one: Alarm) -> str:
+def _name(one: Alarm | BlindSpot) -> str:
     return f"{one.effect.replace('_', ' ')} ({one.sensor})"
 
 
@@ -129,8 +130,7 @@ def _shows_no_delay(found: Watch) -> bool:
 def _blind(found: Watch) -> str:
     """`Run 13 (P13.csv) could not have shown ...`."""
     last = _compared(found)[-1]
-    names = sorted({f"{one.effect.replace('_', ' ')} ({one.sensor})"
-                    for one in found.informative.blind_to})  # fmt: skip
+    names = sorted({_name(one) for one in found.informative.blind_to})
     return (
         f"Run {last.run} ({last.files[0]}) could not have shown every change that would turn a "
         f"requirement: it is blind to {sentence_list(names)}."
