@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import polars as pl
+import pytest
 
 COLUMNS = [f"{what}_{axis}_m" for what in ("position", "reference") for axis in
            ("north", "east", "down")]  # fmt: skip
@@ -45,3 +47,46 @@ def test_rows_that_are_not_kept_take_little_memory(tmp_path: Path) -> None:
     assert np.all(np.abs(read[:, 1] - 20_000) < 500)
     whole_kb = (long - short) * (len(COLUMNS) + 1) * 8 / 1024
     assert read[1, 2] - read[0, 2] < 0.5 * whole_kb
+
+
+AUDITED = """
+import sys
+from pathlib import Path
+from syncline_design.auditing.run import audit
+found = audit([Path(sys.argv[1])])
+peak = next(line for line in open("/proc/self/status") if line.startswith("VmHWM"))
+print(peak.split()[1], found.evidence[0].sha256)
+"""
+
+
+def pictures(path: Path, count: int) -> Path:
+    """Messages of 1 MB at 10 Hz, in chunks that are not packed."""
+    from mcap.writer import CompressionType, Writer
+
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=4_000_000, compression=CompressionType.NONE)
+        writer.start()
+        schema = writer.register_schema("picture", "jsonschema", b"{}")
+        topic = writer.register_channel("/picture", "json", schema)
+        for k in range(count):
+            at = 1_787_654_321_000_000_000 + k * 100_000_000
+            writer.add_message(topic, log_time=at + 3_000_000, data=b"{}" * 500_000,
+                               publish_time=at)  # fmt: skip
+        writer.finish()
+    return path
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux for the peak")
+def test_an_audit_holds_as_much_of_a_large_file_as_of_a_small_one(tmp_path: Path) -> None:
+    """180 MB more of pictures; its evidence is the digest that hashlib makes of the whole file."""
+    peaks = []
+    for count in (60, 240):
+        path = pictures(tmp_path / f"{count}.mcap", count)
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", AUDITED, str(path)],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        peak, digest = done.stdout.split()
+        peaks.append(int(peak))
+        assert digest == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert peaks[1] - peaks[0] < 20_000  # kB

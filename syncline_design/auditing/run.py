@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -26,7 +26,7 @@ from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.stream import UNSET, Incomplete, Stream
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
-from syncline_design.machine.input_files import FileRead, content_of, note_read
+from syncline_design.machine.input_files import ContentsBeside, FileRead, note_read
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import percent
 from syncline_design.spec.load import BadInput
@@ -46,6 +46,7 @@ class _Opened:
 
 def audit(paths: Sequence[Path]) -> Audit:
     """Audit all files; BadInput where none could be read."""
+    contents = ContentsBeside([one for path in paths for one in _files(path)])
     opened, refused, problems = _open(paths)
     if not opened:
         raise BadInput(tuple(flaw for error in problems for flaw in error.problems))
@@ -62,7 +63,7 @@ def audit(paths: Sequence[Path]) -> Audit:
         incomplete=damaged[0] if damaged else None,
         damaged=damaged,
         unreadable=refused,
-        evidence=tuple(one for o in opened for one in _evidence(o.path)),
+        evidence=_evidence(opened, contents),
         notes=_notes(rows),
         version=__version__,
     )
@@ -255,7 +256,17 @@ def _notes(rows: Sequence[StreamAudit]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _evidence(path: Path) -> Iterator[FileRead]:
-    """A file, or every file of a bag's folder, by its content."""
-    inside = sorted(one for one in path.iterdir() if one.is_file()) if path.is_dir() else [path]
-    yield from (FileRead(str(one), content_of(one)) for one in inside)
+def _files(path: Path) -> list[Path]:
+    """A file, or every file of a bag's folder; none of a folder that may not be read."""
+    if not path.is_dir():
+        return [path]
+    try:
+        return sorted(one for one in path.iterdir() if one.is_file())
+    except OSError:  # said where it is opened
+        return []
+
+
+def _evidence(opened: Sequence[_Opened], contents: ContentsBeside) -> tuple[FileRead, ...]:
+    """The files that were opened, by their contents."""
+    read = {str(one) for o in opened for one in _files(o.path)}
+    return tuple(one for one in contents.reads() if one.file in read)

@@ -11,6 +11,7 @@ import contextlib
 import hashlib
 import os
 import stat
+import threading
 from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
 from dataclasses import field
@@ -21,6 +22,7 @@ from syncline_design.machine.records import Record
 
 Identity = tuple[int, int]  # device and inode: one file, whatever its names
 MISSING = "missing"
+PIECE_BYTES = 1 << 20  # that is held of a file while its digest is made
 
 
 class UnsuitableError(Exception):
@@ -172,11 +174,38 @@ def note_read(path: Path) -> None:
 
 
 def content_of(path: Path) -> str:
-    """SHA-256 of a plain file; `missing` where there is none."""
+    """SHA-256 of a plain file, read in pieces; `missing` where there is none."""
+    digest = hashlib.sha256()
     try:
-        return hashlib.sha256(_read(path, None)[0]).hexdigest()
+        with _plain(path) as (descriptor, _):
+            while piece := os.read(descriptor, PIECE_BYTES):
+                digest.update(piece)
     except (OSError, UnsuitableError, ValueError):
         return MISSING
+    return digest.hexdigest()
+
+
+class ContentsBeside:
+    """SHA-256 of files, made in a thread while the caller reads them for what they say."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._paths = tuple(paths)
+        self._digests: list[str] = []
+        # a daemon: a call that ends early does not wait for it
+        self._thread = threading.Thread(target=self._make, daemon=True)
+        self._thread.start()
+
+    def _make(self) -> None:
+        for path in self._paths:
+            self._digests.append(content_of(path))
+
+    def reads(self) -> tuple[FileRead, ...]:
+        """Every file by its content, in the order given."""
+        self._thread.join()
+        return tuple(
+            FileRead(str(path), digest)
+            for path, digest in zip(self._paths, self._digests, strict=True)
+        )
 
 
 def read_plain(path: Path, most: int | None = None) -> bytes:
@@ -189,18 +218,25 @@ def read_plain(path: Path, most: int | None = None) -> bytes:
     return content
 
 
-def _read(path: Path, most: int | None) -> tuple[bytes, os.stat_result]:
+@contextlib.contextmanager
+def _plain(path: Path) -> Iterator[tuple[int, os.stat_result]]:
+    """A plain file as an open descriptor, and what it is."""
     # O_NONBLOCK: opening a FIFO would wait for its writer for ever.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     try:
         status = os.fstat(descriptor)
         demand_plain(status)
+        yield descriptor, status
+    finally:
+        os.close(descriptor)
+
+
+def _read(path: Path, most: int | None) -> tuple[bytes, os.stat_result]:
+    with _plain(path) as (descriptor, status):
         if most is not None and status.st_size > most:
             raise UnsuitableError(f"{status.st_size} bytes; expected at most {most}")
         with os.fdopen(descriptor, "rb", closefd=False) as stream:
             content = stream.read() if most is None else stream.read(most + 1)
-    finally:
-        os.close(descriptor)
     if most is not None and len(content) > most:
         raise UnsuitableError(f"more than {most} bytes")
     return content, status
