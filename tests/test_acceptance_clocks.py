@@ -116,6 +116,25 @@ def test_a_daemon_s_own_bound_shows_no_clock_to_be_off(clocked: Path, named: boo
     assert row["measured"]["high"] == pytest.approx(2e-2, rel=0.01)
 
 
+def test_a_step_beyond_the_bound_is_not_laid_on_the_path(clocked: Path) -> None:
+    """30 ms for 5 of 400 samples: no session is beyond 1 ms for long, and no path is to blame."""
+    clocked.write_text(CLOCKED.replace("stages:", "coverage_factor: 2\nstages:"), "utf-8")
+    source, lines = np.random.default_rng(4), []
+    for day in range(6):
+        late = source.normal(0.0, 2e-5, 400)
+        late[200:205] += 3e-2 * (day == 2)
+        times = 1.7e9 + 86400.0 * day + 16.0 * np.arange(400)
+        lines += [tracking_line(t, x, hard_s=abs(x) + 5e-4)
+                  for t, x in zip(times, late, strict=True)]  # fmt: skip
+    log = write(clocked.parent / "tracking.log", lines)
+    done = run("accept", clocked, log, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert (row["status"], done.exit_code) == ("not_shown", 3), row
+    assert "a step at 2023-" in row["evidence"]
+    assert "was, with 30.0" in row["evidence"]
+    assert "path" not in row["evidence"]
+
+
 def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
     folder = clocked.parent / "logs"
     folder.mkdir()

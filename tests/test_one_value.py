@@ -46,6 +46,25 @@ def test_a_scale_that_may_not_be_named_is_no_bias_of_the_range(tmp_path: Path) -
     assert told == pytest.approx(float(np.std(range_m) / np.mean(range_m)), rel=0.25)
 
 
+@pytest.mark.parametrize("seed", [6, 7])
+def test_a_scale_of_ranges_that_hardly_vary_is_no_bias_either(seed: int, tmp_path: Path) -> None:
+    """A multirotor's ranges vary by an eighth: what is proportional to them changes by no more."""
+    log = make_log(scenario("multirotor_lines", seed, 150.0, 10.0), (SCALE,))
+    range_m = log.columns["range_m"]
+    assert np.std(range_m) < 0.2 * np.mean(range_m)
+    found = asked(log, tmp_path, ("range_scale", "sound_speed"))
+    one = of_range(found, "range_bias")
+    assert (one.kind, found.verdict) == ("stand_in", "unexplained")
+    assert "it changes with the range, by " in one.sentence
+
+
+@pytest.mark.parametrize("seed", [6, 7])
+def test_a_bias_of_ranges_that_hardly_vary_keeps_its_name(seed: int, tmp_path: Path) -> None:
+    log = make_log(scenario("multirotor_lines", seed, 150.0, 10.0), (BIAS,))
+    one = of_range(asked(log, tmp_path, ("range_scale", "sound_speed")), "range_bias")
+    assert one.kind == "cause"
+
+
 def test_a_sweep_that_may_not_be_named_is_no_scatter_of_stamps(tmp_path: Path) -> None:
     """A scanner's stamps are late by its bearing: that is no scatter, and azimuth shows it."""
     found = asked(log_of(SWEEP), tmp_path, ("scan_distortion",))

@@ -98,7 +98,11 @@ def _levels(sessions: Sequence[ClockSession]) -> Iterator[str]:
 
 
 def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
-    """Sessions of different files whose levels stand a thousand apart, with nothing between."""
+    """Sessions whose levels stand a thousand apart, with nothing between.
+
+    Within one table a bad start moves the level of a session alone, another unit its scatter too;
+    the format of a daemon fixes its unit for the whole file.
+    """
     levels = [(float(np.median(np.abs(s.offsets))), s) for s in sessions if s.is_counted]
     levels = sorted((level for level in levels if level[0] > 0.0), key=lambda level: level[0])
     for (low, small), (high, large) in itertools.pairwise(levels):
@@ -106,10 +110,28 @@ def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
         above = [level for level, _ in levels if level >= high]
         ratio = float(np.median(above)) / float(np.median(below))
         apart = small.series.files != large.series.files
-        if apart and high > 100.0 * low and any(0.3 < ratio / t < 3.0 for t in _THOUSANDS):
+        if high <= 100.0 * low or not _is_unit(ratio):
+            continue
+        if apart:
             yield (f"offsets in {large.series.files[0]} are {to_digits(ratio, 3)} times those in "
                    f"{small.series.files[0]}: are the units the same?")  # fmt: skip
             return
+        if large.series.kind.family == "csv" and _is_unit(_scatter(large) / _scatter(small)):
+            at = moment(float(large.series.time_s[0]), large.series.kind.stamps)
+            yield (f"{large.series.kind.name}: in {large.series.files[0]} offsets and their "
+                   f"scatter are {to_digits(ratio, 3)} times as large in the session from {at}: is "
+                   "it in another unit?")  # fmt: skip
+            return
+
+
+def _is_unit(ratio: float) -> bool:
+    """Whether one unit for another would do that."""
+    return any(0.3 < ratio / thousand < 3.0 for thousand in _THOUSANDS)
+
+
+def _scatter(session: ClockSession) -> float:
+    """How far one sample is from the next [s]; not 0."""
+    return max(float(np.median(np.abs(np.diff(session.offsets)))), 1e-30)
 
 
 def _unit_slip(sessions: Sequence[ClockSession]) -> Iterator[str]:
@@ -130,7 +152,7 @@ def _unit_slip(sessions: Sequence[ClockSession]) -> Iterator[str]:
         ratio, of_scatter = (
             float(np.median(size[large]) / np.median(size[small])) for size in (level, scatter)
         )
-        if any(0.3 < ratio / t < 3.0 and 0.3 < of_scatter / t < 3.0 for t in _THOUSANDS):
+        if _is_unit(ratio) and _is_unit(of_scatter):
             first = int(np.flatnonzero(large != large[0])[0])
             kind = tables[0].series.kind
             yield (f"{kind.name}: in {files[0]} offsets and their scatter change by "

@@ -27,12 +27,21 @@ _DAY: Final = 86400.0
 
 @dataclass(frozen=True, slots=True)
 class ClockEvent:
-    """Something that is no steady state; size_s: the largest |offset| that it brought."""
+    """Something that is no steady state; size_s: the largest |offset| that it brought.
+
+    daemon_s: how far off the clock may have been meanwhile by the daemon's own word.
+    """
 
     kind: EventKind
     from_s: float
     to_s: float
     size_s: float
+    daemon_s: float = 0.0
+
+    @property
+    def bound_s(self) -> float:
+        """How far off the clock was, or may have been [s]."""
+        return max(self.size_s, self.daemon_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,9 +196,10 @@ def _lock_events(series: ClockSeries, startup: Flags, longest: float) -> list[Cl
         back = min(stop, len(series) - 1)
         begins, ends = float(series.time_s[start]), float(series.time_s[back])
         size = _size(series.offset_s[start : back + 1]) + _drifted(series, max(0, start - 1), back)
-        found.append(ClockEvent("unlock", begins, ends, size))
+        daemon = _size(series.hard_s[start:stop])
+        found.append(ClockEvent("unlock", begins, ends, size, daemon))
         if ends - begins > longest or (stop - start > 1 and ends > begins):
-            found.append(ClockEvent("holdover", begins, ends, size))
+            found.append(ClockEvent("holdover", begins, ends, size, daemon))
         if stop < len(series):
             found.append(ClockEvent("relock", ends, ends, _size(series.offset_s[stop : stop + 1])))
     return found

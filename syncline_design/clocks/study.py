@@ -151,7 +151,7 @@ def _figures(
     known = [s.hard_s for s in counted if not math.isnan(s.hard_s)]
     hard = max(known) if known else None
     bound = {"larger": max(seen, hard or 0.0), "statistical": seen, "hard": hard}[settings.use]
-    sizes = [e.size_s for s in sessions for e in s.events
+    sizes = [e.bound_s for s in sessions for e in s.events
              if e.kind not in ("startup", "frequency_jump")]  # fmt: skip
     event = max([bound or 0.0, *(size + declared for size in sizes)])
     return _Figures(quantiles, statistical, hard, bound, event, method)
@@ -350,6 +350,11 @@ def _notes(
     off = running_off([s for s in sessions if s.is_counted], figures.statistical_s)
     if off is not None:
         said.append(off)
+    alone = max((e.daemon_s for s in sessions for e in s.events), default=0.0)
+    if alone > max(figures.bound_s or 0.0, 0.0):
+        most = format_duration(rounded(alone, 3))
+        said.append(f"while lock was lost the clock may have been {most} off, by the daemon's own "
+                    "word: the bound with events says so")  # fmt: skip
     total = sum(len(s.events) for s in sessions)
     if total > MOST_EVENTS:
         said.append(f"{total} events, of which the {MOST_EVENTS} largest are listed")

@@ -11,10 +11,11 @@ from syncline_design.comparison.acceptance import AssumptionStatus, MeasuredFigu
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration, to_digits
+from syncline_design.model.figure_text import format_duration, percent, to_digits
 from syncline_design.spec.case import Case
 from syncline_design.verdict.measured import COMMONLY, coverage_of, coverage_words
 
+DISTURBED: Final = ("step", "unlock", "holdover", "gap", "relock", "leap_second")
 LONGER: Final = 1.001  # than the sessions: a horizon that they do not show
 
 
@@ -42,7 +43,7 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
     asked, measured = format_duration(one.value), format_duration(found.bound_s)
     if found.bound_s > one.value and seen_s(found) <= one.value:
         said = f"measured bound {measured}, more than the {asked} assumed, but no session was "
-        return Judgement("not_shown", said + f"beyond that: {narrowed_by(found)}", figure)
+        return Judgement("not_shown", f"{said}{_not_beyond(one.value, found)}", figure)
     if found.bound_s > one.value:
         times = f"{to_digits(found.bound_s / one.value, 3)} times" if one.value else "not"
         said = f"measured bound {measured}, {times} the {asked} assumed"
@@ -60,6 +61,17 @@ def seen_s(found: Timing) -> float:
     how far it is.
     """
     return max((s.quantile_s or 0.0 for s in found.sessions if s.counted), default=0.0)
+
+
+def _not_beyond(bound_s: float, found: Timing) -> str:
+    """Of logs with a bound beyond the assumed one, and no session that was: what would do."""
+    disturbed = [e for e in found.events if e.kind in DISTURBED and e.size_s > bound_s]
+    if not disturbed:
+        return f"beyond that: {narrowed_by(found)}"
+    worst = max(disturbed, key=lambda event: event.size_s)
+    share, kind = percent(found.claim.coverage, 3), worst.kind.replace("_", " ")
+    return (f"beyond that for {share} of its time; a {kind} at {worst.from_} was, with "
+            f"{format_duration(worst.size_s)}: see what made it")  # fmt: skip
 
 
 def narrowed_by(found: Timing) -> str:

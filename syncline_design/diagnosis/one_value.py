@@ -8,6 +8,10 @@ every v_k has to be nothing: it is the share of itself by which the effect chang
 deviation of c_k.  Scatter of stamps has to have no mean that goes with any of them: s c_k over its
 size.  Judged beside the slow states, so noise that is larger or slower than the spec's refutes
 nothing.  Time is not among the c_k: what changes with time is still that effect, and said to vary.
+
+Ranges that hardly vary leave a scale little to change by: with a mean m and a deviation d of the
+range, what is proportional to it has v = d / m.  v m / d is the part of the effect that is gone
+where the covariate is nothing, and of one value none of it is.
 """
 
 from __future__ import annotations
@@ -32,6 +36,9 @@ from syncline_design.machine.quick_dataclass import dataclass
 # motion (a laser scanner's delay with the range, 1e-5), names of neighbours with 1e-11 and less.
 REFUTED = math.log(1e-8)
 CHANGES = 0.25  # share of itself, from which a change is not the effect's own small print
+# log p, and the part of an effect that goes with a covariate to nothing, from which it is mostly
+# no constant: a scale that is called a bias has 1e-6 where ranges vary by an eighth of themselves.
+PROPORTIONAL, MOSTLY = math.log(1e-4), 0.5
 STILL = 1e-9  # of a covariate's standard deviation, below which it tells nothing
 Inside = NDArray[np.bool_]
 
@@ -75,23 +82,40 @@ def _clearest(states: States, model: Model, shape: Array, size: float) -> Uneven
     asked = list(_standardised(states.data.view, np.sum(shape**2, axis=(1, 2))))
     if not asked or not size > 0.0:
         return None
-    judged = states.judged(model, [shape * c[:, None, None] for _, c in asked])
-    (name, _), best = min(zip(asked, judged, strict=True), key=lambda pair: pair[1].log_p)
+    judged = states.judged(model, [shape * one.values[:, None, None] for one in asked])
+    changed, best = min(zip(asked, judged, strict=True), key=lambda pair: pair[1].log_p)
     share = float(np.linalg.norm(best.values)) / size
-    if best.log_p + math.log(len(asked)) < REFUTED and share > CHANGES:
-        return Uneven(name, share)
+    chance = best.log_p + math.log(len(asked))
+    grows = shape.shape[2] == 1 and float(best.values[0]) * changed.at_nothing > MOSTLY * size
+    if (chance < REFUTED and share > CHANGES) or (chance < PROPORTIONAL and grows):
+        return Uneven(changed.name, share)
     return None
 
 
-def _standardised(view: Scene, weight: Array) -> Iterator[tuple[str, Array]]:
-    """Covariates but time, of mean 0 and variance 1 by a weight of the rows; angles as two."""
+@dataclass(frozen=True, slots=True)
+class _Standardised:
+    """A covariate of mean 0 and variance 1 by a weight of the rows.
+
+    at_nothing: standard deviations from where the covariate is 0 to its mean; 0 of an angle, which
+    has no such place.
+    """
+
+    name: str
+    values: Array
+    at_nothing: float
+
+
+def _standardised(view: Scene, weight: Array) -> Iterator[_Standardised]:
+    """Covariates but time; angles as two."""
+    share = weight / max(float(np.sum(weight)), 1e-300)
     for one in covariates(view):
         if one.unit == "s":
             continue
-        angle = np.radians(one.values)
-        for values in (np.sin(angle), np.cos(angle)) if one.unit == "deg" else (one.values,):
-            share = weight / max(float(np.sum(weight)), 1e-300)
-            off = values - float(np.sum(share * values))
-            spread = math.sqrt(float(np.sum(share * off**2)))
+        angle, turns = np.radians(one.values), one.unit == "deg"
+        for values in (np.sin(angle), np.cos(angle)) if turns else (one.values,):
+            mean = float(np.sum(share * values))
+            spread = math.sqrt(float(np.sum(share * (values - mean) ** 2)))
             if spread > STILL * (1.0 + float(np.max(np.abs(values)))):
-                yield one.name, off / spread
+                yield _Standardised(
+                    one.name, (values - mean) / spread, 0.0 if turns else mean / spread
+                )

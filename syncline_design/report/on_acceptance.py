@@ -97,7 +97,8 @@ def _sentences(result: Acceptance) -> Iterator[str]:
     words = {s: _OUTCOMES[s][2] if n == 1 or s != "holds" else "hold" for s, n in counts.items()}
     of = [f"at least one of {len(one.rows)} broken" for one in result.groups]
     told = ", ".join([*of, *(f"{n} {words[s]}" for s, n in counts.items())])
-    yield f"Of {len(rows)} assumptions of the verdict: {told}."
+    noun = "assumption" if len(rows) == 1 else "assumptions"
+    yield f"Of {len(rows)} {noun} of the verdict: {told}."
     yield from (sentence(row) for row in rows if row.status == "broken")
     for one in result.groups:
         yield group_sentence(result, one)
