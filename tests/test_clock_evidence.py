@@ -96,6 +96,11 @@ def test_a_refclock_that_steers_nothing_is_the_evidence(tmp_path: Path) -> None:
     steered = [line.replace("192.0.2.1", "PPS2") for line in tracking]
     logs[0] = write(tmp_path / "steered.log", steered)
     assert study_logs(logs, TimingSettings()).timing.claim.rests_on == "servo"
+    for rows, share in ((tracking[:200], "17 %"), (tracking[:-150], "98 %")):
+        logs[0] = write(tmp_path / "part.log", rows)
+        part = study_logs(logs, TimingSettings()).timing
+        assert part.claim.rests_on == "servo"
+        assert any(f"is of {share} of its rows" in note for note in part.notes), part.notes
 
 
 def test_the_system_clock_is_phc2sys_and_ptp4l_together(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from syncline_design.clocks.result import ClockEntryKind
 from syncline_design.clocks.series import ClockSeries
 from syncline_design.clocks.sessions import sessions_of
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import percent
 
 SIGNS: Final = {
     "chrony tracking": "local - reference in the log",
@@ -29,6 +30,8 @@ SIGNS: Final = {
     "ppstest": "clock - whole second in the log",
     "CSV": "local - reference by the column's name",
 }
+COVERED: Final = 0.99  # of a refclock's rows, that a tracking log has to be about
+LONGEST_POLL_S: Final = 2048.0  # twice chrony's default maxpoll of 10
 _LINUXPTP_SIGN: Final = "local - reference in the log"
 
 
@@ -78,14 +81,15 @@ def select(
             first, "phc2sys `sys offset` tells how well a card follows the system clock: no "
             "evidence of the system clock itself",
             expected="what disciplines the system clock (chrony, ntpd, phc2sys `phc offset`)",
-            found=", ".join(names), hint="--source NAME takes it for a clock all the same; "
+            found=", ".join(names),
+            hint="`timing --source NAME` takes it for a clock all the same; "
             "--entry timestamping makes a method of it",
         )  # fmt: skip
     families = sorted({one.kind.family for one in usable})
     if len(families) > 1:
         raise refused(first, "several kinds of logs that say different things of a clock",
                       found=", ".join(names), expected="logs of one kind",
-                      hint="--source NAME takes one of them")  # fmt: skip
+                      hint="give those of one kind, or `timing --source NAME`")  # fmt: skip
     return _ranked(usable, series)
 
 
@@ -110,7 +114,7 @@ def _ranked(usable: Sequence[ClockSeries], series: Sequence[ClockSeries]) -> Sou
         largest = {name: _level([s for s in usable if s.kind.name == name]) for name in names}
         names.sort(key=lambda name: -largest[name])
         notes.append(f"of {len(names)} sources alike, {names[0]} has the largest offsets and is "
-                     "used; --source NAME takes another")  # fmt: skip
+                     "used; `timing --source NAME` takes another")  # fmt: skip
     notes += _what_phc2sys_compares(names[0])
     kept = {s.kind.name: s for s in usable}
     series = [replace(s, kind=kept[s.kind.name].kind) if s.kind.name in kept else s for s in series]
@@ -136,21 +140,39 @@ def _level(series: Sequence[ClockSeries]) -> float:
 
 
 def _independent_refclocks(series: Sequence[ClockSeries]) -> tuple[list[ClockSeries], list[str]]:
-    """Reference clocks that the tracking log never names: marked `noselect`, they steer nothing."""
+    """Reference clocks that the tracking log never names: marked `noselect`, they steer nothing.
+
+    Only where the tracking log is of their whole time: before or after it, they may have steered.
+    """
     tracked = [one for one in series if one.kind.name == "chrony tracking"]
     references = frozenset[str]().union(*(one.references for one in tracked))
     found, notes = [], []
     for one in series:
-        free = (
-            bool(tracked)
-            and one.kind.name.startswith("chrony refclock")
-            and one.kind.reference not in references
+        unnamed = one.kind.name.startswith("chrony refclock") and (
+            one.kind.reference not in references
         )
-        if free:
-            notes.append(f"{one.kind.name} steers nothing by the tracking log: independent")
-            one = replace(one, kind=replace(one.kind, steering="independent", rank=0))
+        if tracked and unnamed:
+            covered = _covered(one, tracked)
+            if covered >= COVERED:
+                notes.append(f"{one.kind.name} steers nothing by the tracking log: independent")
+                one = replace(one, kind=replace(one.kind, steering="independent", rank=0))
+            else:
+                share = percent(covered, 2)
+                notes.append(f"{one.kind.name}: the tracking log is of {share} of its rows; what "
+                             "steered the clock else is not in these logs")  # fmt: skip
         found.append(one)
     return found, list(dict.fromkeys(notes))
+
+
+def _covered(one: ClockSeries, tracked: Sequence[ClockSeries]) -> float:
+    """The share of rows that have a row of the tracking log about them."""
+    times = np.sort(np.concatenate([log.time_s for log in tracked]))
+    if times.shape[0] < 2 or not len(one):
+        return 0.0
+    reach = max(10.0 * float(np.median(np.diff(times))), LONGEST_POLL_S)
+    after = np.clip(np.searchsorted(times, one.time_s), 1, times.shape[0] - 1)
+    apart = np.minimum(np.abs(one.time_s - times[after - 1]), np.abs(times[after] - one.time_s))
+    return float(np.mean(apart <= reach))
 
 
 def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> SourceSelection:
