@@ -5,11 +5,15 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
+
+from syncline_design.auditing.stream import examined
+from syncline_design.logs.readers.stream import Stamps, Stream
 
 COLUMNS = [f"{what}_{axis}_m" for what in ("position", "reference") for axis in
            ("north", "east", "down")]  # fmt: skip
@@ -90,3 +94,17 @@ def test_an_audit_holds_as_much_of_a_large_file_as_of_a_small_one(tmp_path: Path
         peaks.append(int(peak))
         assert digest == hashlib.sha256(path.read_bytes()).hexdigest()
     assert peaks[1] - peaks[0] < 20_000  # kB
+
+
+def test_an_audit_holds_some_numbers_a_message(tmp_path: Path) -> None:
+    """200 000 messages: far fewer than the hundred neighbours by which each is looked at."""
+    rng = np.random.default_rng(7)
+    stamp = 1_787_654_321_000_000_000 + 1_000_000 * np.arange(200_000)
+    receive = np.maximum.accumulate(stamp + (1e6 * rng.gamma(2.0, 1.0, stamp.size)).astype(int))
+    told = Stream("imu", (), stamp.size, Stamps("stamp", "receive time", stamp, receive))
+    tracemalloc.start()
+    found = examined(told)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert not found.faults
+    assert peak < 400 * stamp.size

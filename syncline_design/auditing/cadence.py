@@ -211,11 +211,11 @@ def missing(
 def _about(interval: Array) -> Array:
     """The shortest of the intervals about each: a sensor that measures ever faster, or less
     often for a while, leaves out nothing."""
-    ends = np.full(_NEXT, np.inf)
-    near = np.lib.stride_tricks.sliding_window_view(
-        np.concatenate([ends, interval, ends]), 2 * _NEXT + 1
-    )
-    return np.asarray(np.delete(near, _NEXT, axis=1).min(axis=1))
+    least = np.full(interval.size, np.inf)
+    for apart in range(1, min(_NEXT, interval.size - 1) + 1):
+        np.minimum(least[apart:], interval[:-apart], out=least[apart:])
+        np.minimum(least[:-apart], interval[apart:], out=least[:-apart])
+    return least
 
 
 def _lost(series: Series, pace: Cadence, level_s: float, *, late: bool) -> Array:

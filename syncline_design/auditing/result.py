@@ -108,6 +108,7 @@ class StreamAudit(Record):
 
     error_m, tau_crit_s: only with a spec; role: which of its roles this stream is held against.
     cannot_show: what these stamps leave open.  shape: how the stamps follow one another.
+    examined: False where its messages carry no stamp of their own, in an order of time.
     """
 
     name: str
@@ -130,6 +131,7 @@ class StreamAudit(Record):
     notes: tuple[str, ...] = ()
     trace: tuple[EnvelopePoint, ...]
     partial: bool = False
+    examined: bool = True
 
     @property
     def sound(self) -> bool:
@@ -158,7 +160,10 @@ class AuditedFor(Record):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Audit(Record):
-    """All streams of all files.  `incomplete`: the first of the damaged files, `damaged` each."""
+    """All streams of all files.  `incomplete`: the first of the damaged files, `damaged` each.
+
+    unexamined: files none of whose streams could be examined, and streams that could not be read.
+    """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
     verdict: Soundness
@@ -166,6 +171,7 @@ class Audit(Record):
     incomplete: IncompleteFile | None = optional()
     damaged: tuple[IncompleteFile, ...] = ()
     unreadable: tuple[IncompleteFile, ...] = ()
+    unexamined: tuple[IncompleteFile, ...] = ()
     evidence: tuple[FileRead, ...]
     notes: tuple[str, ...]
     version: str
@@ -173,7 +179,7 @@ class Audit(Record):
 
     @property
     def exit_code(self) -> int:
-        """0 sound, 1 faults, 2 where a file gave nothing."""
-        if self.unreadable:
+        """0 sound, 1 faults, 2 where a file gave nothing, or a stream of it could not be read."""
+        if self.unreadable or self.unexamined:
             return 2
         return 0 if self.verdict == "sound" else 1

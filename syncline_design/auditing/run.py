@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -63,6 +63,7 @@ def audit(paths: Sequence[Path]) -> Audit:
         incomplete=damaged[0] if damaged else None,
         damaged=damaged,
         unreadable=refused,
+        unexamined=tuple(one for o in opened for one in _unexamined(o)),
         evidence=_evidence(opened, contents),
         notes=_notes(rows),
         version=__version__,
@@ -92,6 +93,18 @@ def _open(
             continue
         opened.append(_Opened(path, recording.format, streams, recording.incomplete))
     return opened, tuple(refused), problems
+
+
+def _unexamined(opened: _Opened) -> Iterator[IncompleteFile]:
+    """Streams that could not be read, and a file of which none was examined: no word is said of
+    their stamps, so that they are not sound."""
+    for stream in opened.streams:
+        if stream.unread:
+            reason = f"{stream.name} was not examined: {stream.unread}"
+            yield IncompleteFile(str(opened.path), reason, stream.messages)
+    if not any(_is_told(one) or one.unread for one in opened.streams):
+        reason = f"no stream of it was examined: {_why_untold(opened.streams[0])}"
+        yield IncompleteFile(str(opened.path), reason, sum(s.messages for s in opened.streams))
 
 
 def _lacks(streams: Sequence[Stream]) -> str | None:
@@ -141,7 +154,7 @@ def _first(stream: Stream) -> int | None:
 def _is_told(stream: Stream) -> bool:
     """Whether messages carry a time of their own."""
     stamps = stream.stamps
-    if stamps is None or stamps.primary_ns.size == 0:
+    if stream.unread or stamps is None or not bool(np.any(stamps.primary_ns != UNSET)):
         return False
     if "points" in stream.quantity and stamps.secondary_ns is None:
         return False  # a cloud in a file lies in the order of space
@@ -152,10 +165,8 @@ def _untold(opened: _Opened, stream: Stream) -> StreamAudit:
     """A stream whose messages carry no time of their own, or points in no order of time."""
     stamps = stream.stamps
     names = StampNames(None, None) if stamps is None else StampNames(None, stamps.primary)
-    why = "anything: its messages carry no stamp of their own"
-    if stamps is not None and "points" in stream.quantity and not is_receipt(stamps.primary):
+    if stamps is not None and _is_cloud(stream):
         names = StampNames(stamps.primary, None)
-        why = "anything: one time a point, and points lie in the order of space"
     duration = None
     known = np.zeros(0) if stamps is None else stamps.primary_ns[stamps.primary_ns != UNSET]
     if known.size > 1:
@@ -166,9 +177,23 @@ def _untold(opened: _Opened, stream: Stream) -> StreamAudit:
         stamps=names, timeline=stream.timeline, quantity=stream.quantity, faults=(), offset_s=None,
         residual_s=ResidualTime(None, None, None), smallest_seen=SmallestSeen(None, None),
         tau_crit_s=None, error_m=None,
-        cannot_show=(why,), notes=stream.notes,
-        trace=(), partial=stream.partial,
+        cannot_show=(f"anything: {_why_untold(stream)}",), notes=stream.notes,
+        trace=(), partial=stream.partial, examined=False,
     )  # fmt: skip
+
+
+def _is_cloud(stream: Stream) -> bool:
+    """Whether it is a file of points with a time each."""
+    stamps = stream.stamps
+    return stamps is not None and "points" in stream.quantity and not is_receipt(stamps.primary)
+
+
+def _why_untold(stream: Stream) -> str:
+    if stream.unread:
+        return stream.unread
+    if _is_cloud(stream):
+        return "one time a point, and points lie in the order of space"
+    return "its messages carry no stamp of their own"
 
 
 def _row(opened: _Opened, one: Examined) -> StreamAudit:

@@ -28,6 +28,7 @@ _FAR_S: Final = 0.05
 _SPREADS: Final = 20.0  # of the delays
 _MOST: Final = 0.05  # of all messages: more are how the stream is
 _WIDE, _LOW = 600, 5.0  # messages, per cent of them: no host holds up all of so many
+_AT_ONCE: Final = 1 << 14  # windows, each of which is held whole while its middle is looked for
 _AT_END: Final = 3  # messages: a clock that was set is told by four
 _OLD_S: Final = 5.0  # by which a message may be held up on its way while others pass
 _STEADY: Final = 0.5  # of an interval
@@ -70,7 +71,10 @@ def _level(late: NDArray[np.int64]) -> NDArray[np.int64]:
     if late.size <= size:
         return np.full(late.size, np.sort(late)[late.size // 2])
     windows = np.lib.stride_tricks.sliding_window_view(late, size)
-    middle = np.partition(windows, _AROUND, axis=1)[:, _AROUND]
+    middle = np.concatenate([
+        np.partition(windows[at : at + _AT_ONCE], _AROUND, axis=1)[:, _AROUND].copy()
+        for at in range(0, windows.shape[0], _AT_ONCE)
+    ])  # fmt: skip
     return np.concatenate(
         [np.full(_AROUND, middle[0]), middle, np.full(_AROUND, middle[-1])]
     )  # fmt: skip

@@ -64,6 +64,8 @@ def audit(
         if case is not None:
             found = held_against(found, case, seed)
     say_unreadable(found.unreadable)
+    for one in found.unexamined:
+        say(f"{one.file}: {one.reason}")
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
     emit(console(on_audit(found)), targets, lambda name: render_audit(name, found), quiet=quiet,

@@ -124,6 +124,10 @@ def _faulty(result: Audit) -> list[StreamAudit]:
 
 def _outcome(result: Audit) -> Outcome:
     if result.verdict == "sound":
+        if not any(row.examined for row in result.streams):
+            return Outcome("warn", "!", "Nothing examined")
+        if result.damaged or result.unreadable or result.unexamined:
+            return Outcome("warn", "!", "Sound as far as it was read")
         return Outcome("good", "\u2713", "Sound")
     count = len({(f.fault, r.name, f.from_s) for r in result.streams for f in r.faults if f.counts})
     return Outcome("bad", "\u2717", f"{count} fault{'' if count == 1 else 's'}")
@@ -131,8 +135,10 @@ def _outcome(result: Audit) -> Outcome:
 
 def _sentences(result: Audit) -> Iterator[Inline]:
     faulty = _faulty(result)
-    told = [row for row in result.streams if row.stamps.primary is not None]
-    if not faulty:
+    told = [row for row in result.streams if row.examined]
+    if not told:
+        yield "Of no stream do stamps say anything."
+    elif not faulty:
         yield f"No fault in the stamps of {len(told)} stream{'' if len(told) == 1 else 's'}."
     else:
         names = ", ".join(row.name for row in faulty[:6])
@@ -145,6 +151,8 @@ def _sentences(result: Audit) -> Iterator[Inline]:
     if result.unreadable:
         files = ", ".join(one.file for one in result.unreadable)
         yield f"Nothing could be read of {files}."
+    for one in result.unexamined:
+        yield f"Of {one.file}: {one.reason}."
 
 
 def _facts(result: Audit) -> Iterator[tuple[str, str]]:
@@ -158,7 +166,7 @@ def _facts(result: Audit) -> Iterator[tuple[str, str]]:
 def _damaged(result: Audit) -> list[Node]:
     rows = [
         (Cell(one.file, code=True), one.reason, Cell(numbers.count(one.messages), one.messages))
-        for one in (*result.damaged, *result.unreadable)
+        for one in (*result.damaged, *result.unreadable, *result.unexamined)
     ]
     return show(table("Damaged", ("File", "Why", "Messages read #"), rows), silent=True)
 
@@ -222,8 +230,7 @@ def _drawer(rows: list[StreamAudit]) -> Callable[[], InlineChart]:
 def _streams(result: Audit) -> Table:
     rows = [
         (
-            Cell(row.name, code=True, tone="good" if row.sound else "bad",
-                 mark="\u2713" if row.sound else "\u2717", sub="partial" if row.partial else ""),
+            _named(row),
             Cell(numbers.count(row.messages), row.messages),
             Cell(numbers.number(row.rate_hz, 4), row.rate_hz),
             row.shape,
@@ -238,6 +245,16 @@ def _streams(result: Audit) -> Table:
     heads = ("Stream", "Messages #", "Rate [Hz] #", "Rhythm", "Stamp", "Receipt", "Timeline",
              "Stamp \N{MINUS SIGN} receipt #", "Faults")  # fmt: skip
     return table("Streams", heads, rows)
+
+
+def _named(row: StreamAudit) -> Cell:
+    """A stream's name, marked as sound, as one with faults, or not at all."""
+    sub = "partial" if row.partial else ""
+    if not row.examined:
+        return Cell(row.name, code=True, sub=sub)
+    good = row.sound
+    return Cell(row.name, code=True, tone="good" if good else "bad",
+                mark="\u2713" if good else "\u2717", sub=sub)  # fmt: skip
 
 
 def _left(result: Audit) -> Table:

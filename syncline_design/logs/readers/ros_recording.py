@@ -18,8 +18,10 @@ from syncline_design.logs.readers.ros_types import (
     StampOf,
     stamp_of,
     type_of,
+    unread_of,
 )
 from syncline_design.logs.readers.stream import (
+    UNSET,
     Incomplete,
     Nanoseconds,
     Piece,
@@ -184,7 +186,8 @@ class _Tally:
     own: StampColumn = field(default_factory=StampColumn)
     published_apart: bool = False
     messages: int = 0
-    unread: int = 0
+    unread: str = ""  # why no message can be
+    cut: int = 0  # messages too short for the stamp of their type
     clouds: list[CloudTimes] = field(default_factory=list)
 
 
@@ -235,7 +238,7 @@ class RosRecording:
         first = None if type_ is None else type_.unpacked(message.data)
         meaning = None if first is None else meaning_of(channel.topic, channel.kind, first)
         name, read = own or ("", None)
-        begun = _Tally(channel, name, read, meaning, type_)
+        begun = _Tally(channel, name, read, meaning, type_, unread=unread_of(channel, self.path))
         self._known[channel.topic, channel.kind] = begun
         return begun
 
@@ -294,7 +297,9 @@ def _count(tally: _Tally, message: RawMessage) -> None:
     tally.logged.append(message.log_ns)
     published = message.publish_ns
     if tally.own_of is not None:
-        tally.own.append(tally.own_of(message.data))
+        own = tally.own_of(message.data)
+        tally.cut += own == UNSET
+        tally.own.append(own)
     elif published is not None:
         tally.own.append(published)
         tally.published_apart = tally.published_apart or published != message.log_ns
@@ -317,6 +322,9 @@ def _stream(name: str, tally: _Tally, partial: bool) -> Stream:
     else:
         notes += meaning.notes
         points = None if not tally.clouds else CloudTimes.median_of(tally.clouds)
+    if tally.unread or tally.cut:
+        short = f"{tally.cut} messages are too short for the stamp of their type"
+        notes.append(tally.unread or short)
     return Stream(
         name=name,
         quantity=() if meaning is None else meaning.quantity,
@@ -331,7 +339,14 @@ def _stream(name: str, tally: _Tally, partial: bool) -> Stream:
         columns=() if meaning is None else meaning.columns,
         points=points,
         static=() if meaning is None else meaning.static,
+        unread=_unread_of(tally),
     )
+
+
+def _unread_of(tally: _Tally) -> str:
+    if tally.cut == tally.messages:
+        return f"no message is long enough for the stamp of a {tally.channel.kind}"
+    return tally.unread
 
 
 def _stamps(tally: _Tally) -> Stamps:

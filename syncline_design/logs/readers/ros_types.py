@@ -66,6 +66,17 @@ def stamp_of(channel: BagChannel, path: Path) -> tuple[str, StampOf] | None:
     return None
 
 
+def unread_of(channel: BagChannel, path: Path) -> str:
+    """Why nobody can say whether messages of a channel carry a stamp; empty where it is known.
+
+    A header at the beginning is read whatever a definition says of the rest.
+    """
+    if channel.encoding == "other" or not channel.definition.strip() or stamp_of(channel, path):
+        return ""
+    own = _own_store(channel, library("rosbags.typesys", path, "ROS bag"))
+    return "" if own is not None else f"the definition of {channel.kind} cannot be read"
+
+
 def _reader(encoding: Encoding, at: int) -> StampOf:
     """ROS 1: two unsigned numbers; CDR: four bytes of encapsulation, whose second is the order."""
     ros1 = struct.Struct("<II")

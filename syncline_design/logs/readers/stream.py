@@ -107,6 +107,7 @@ class Stream:
     points: PointTimes | None = None
     static: tuple[StaticPose, ...] = ()  # what its first message says of the vehicle's frames
     nature: Nature = "unknown"
+    unread: str = ""  # why its messages cannot be read, only counted
 
     @property
     def has_attitude(self) -> bool:
