@@ -101,5 +101,5 @@ def _refclock(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str] | 
     if cells[6] == "-":
         return None
     offset, dispersion = float(cells[7]), float(cells[8])
-    kind = SourceKind(f"chrony refclock {cells[2]}", "chrony", 2, "servo", "utc", cells[2])
+    kind = SourceKind(f"chrony refclock {cells[2]}", "chrony", 2, "servo", "utc", cells[2], False)
     return kind, Row(time_s, -offset, abs(offset) + dispersion, cells[4] != "?"), ""

@@ -127,4 +127,5 @@ def _kind(key: tuple[str, str], what: str | None, time_s: float, *, by_system: b
     name = f"{program} {named}".strip()
     if program == "phc2sys" and by_system:
         name += FOLLOWS_SYSTEM
-    return SourceKind(name, "linuxptp", _RANKS[program], _STEERING[program], stamps)
+    whole = program != "phc2sys"
+    return SourceKind(name, "linuxptp", _RANKS[program], _STEERING[program], stamps, "", whole)

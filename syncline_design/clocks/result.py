@@ -78,7 +78,10 @@ class TimingClaim(Record):
 
 @dataclass(frozen=True, slots=True)
 class SourceResult(Record):
-    """One source that the logs hold; used: the figures rest on it."""
+    """One source that the logs hold; used: the figures rest on it.
+
+    whole_way: whether its hard bound holds the whole way to the reference.
+    """
 
     name: str
     sign: str
@@ -88,6 +91,7 @@ class SourceResult(Record):
     quantile_s: float | None
     hard_s: float | None
     used: bool
+    whole_way: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -225,7 +225,7 @@ def _sum(system: ClockSeries, card: ClockSeries) -> ClockSeries | None:
     locked = known.locked[after] & known.locked[after - 1]
     reach = max(10.0 * float(np.median(np.diff(known.time_s))), 1.0)
     kind = replace(system.kind, name=f"CLOCK_REALTIME by phc2sys and {card.kind.name}", rank=0,
-                   steering=card.kind.steering)  # fmt: skip
+                   steering=card.kind.steering, whole_way=card.kind.whole_way)  # fmt: skip
     begin = np.zeros(len(system), dtype=bool)
     begin[:1] = True
     files = tuple(dict.fromkeys((*system.files, *card.files)))

@@ -44,7 +44,9 @@ class SourceKind:
 
     rank: which source of a family is taken first.  steering: whether the clock is steered by just
     these offsets (a servo nulls what it measures).  reference: what it is held against, where it
-    has a name that another log of the family uses.
+    has a name that another log of the family uses.  whole_way: whether a bound of its own holds the
+    way to the reference too: a card's error is none of phc2sys' business, a pulse's delay none of a
+    reference clock's.
     """
 
     name: str
@@ -53,6 +55,7 @@ class SourceKind:
     steering: Steering
     stamps: TimeBase
     reference: str = ""
+    whole_way: bool = True
 
 
 @dataclass(slots=True)

@@ -254,7 +254,7 @@ def _sources(chosen: SourceSelection, settings: TimingSettings) -> tuple[SourceR
         found.append(SourceResult(
             name, sign_of(name), parts[0].kind.steering, sum(len(one) for one in parts),
             len(counted), max(quantiles, default=None), max(hard, default=None),
-            name == chosen.used[0].kind.name,
+            name == chosen.used[0].kind.name, parts[0].kind.whole_way,
         ))  # fmt: skip
     return tuple(found)
 
