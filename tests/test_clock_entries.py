@@ -81,6 +81,9 @@ def test_what_it_means_for_a_spec_is_what_check_then_says(tmp_path: Path) -> Non
     means = json.loads(done.stdout)["spec"]
     assert (means["before"], means["after"]) == ("meets", "fails")
     assert means["requirement_changes"] == ["SYNC-1: pass to fail"]
+    shown = run("timing", *logs, "--spec", spec).stdout
+    assert "✗ Bound " in shown
+    assert "with which the spec no longer passes" in shown
     assert means["measured_tau_s"] > 10.0 * means["tau_s"]
     assert "asked_coverage" not in means  # k = 2, said to be 95 %
     spec.write_text(base.replace("coverage_factor: 2", "coverage_factor: 3"), "utf-8")

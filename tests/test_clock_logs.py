@@ -355,6 +355,11 @@ REFUSED = {
     "no unit": (b"time_s,offset\n" + b"1,2\n" * 30, "no offset whose unit and sign are known"),
     "no time": (b"epoch,offset_us\n" + b"1,2\n" * 30, "no time"),
     "no number": (b"time_s,offset_us\n1,2\n2,x\n", "no number in column offset"),
+    "negative bound": (b"time_s,offset_us,bound_us\n1,2,3\n2,2,-3\n", "a bound below 0"),
+    "filtered alone": (
+        "\n".join(made.refclock_lines(START + 16.0 * k, 1e-5)[1] for k in range(40)).encode(),
+        "only filtered samples",
+    ),
     "infinite": (b"time_s,offset_us\n1,2\n2,inf\n", "no number in column offset"),
     "beyond": (b"time_s,offset_us\n1,2\n2,1e300\n", "no number in column offset"),
     "ragged": (b"time_s,offset_us\n1,2\n2\n3,4\n", "a row has not the header's cells"),

@@ -187,7 +187,10 @@ class _Cells:
         bound = self._number("bound")
         own = self._text("session")
         restart = own is not None and before is not None and own != before
-        hard = math.nan if bound is None else abs(bound)
+        if bound is not None and bound < 0.0:
+            raise refused(self.file.path, "a bound below 0", line=self.line,
+                          expected="how far off the clock may be, to either side")  # fmt: skip
+        hard = math.nan if bound is None else bound
         return Row(time_s, offset_s, hard, self._locked(), restart=restart), own
 
     def _text(self, key: str) -> str | None:

@@ -156,6 +156,10 @@ def _format(file: LogFile) -> str:
         shown = next((line.strip() for line in head if not _is_decoration(line)), "")
         if not shown:
             raise refused(file.path, "no samples", expected=_FORMATS, found="only headers")
+        if any(chrony.is_repeat(line) for line in head):
+            raise refused(file.path, "only filtered samples of refclocks.log",
+                          expected="the raw ones, too, between which chrony writes these",
+                          found=repr(shown[:60]))  # fmt: skip
         columns_hint = "a table needs offset_s (or _ms, _us, _ns): local minus reference"
         raise refused(file.path, "no clock log that is known", expected=_FORMATS,
                       found=repr(shown[:60]), hint=columns_hint)  # fmt: skip

@@ -155,7 +155,8 @@ def _independent_refclocks(series: Sequence[ClockSeries]) -> tuple[list[ClockSer
             covered = _covered(one, tracked)
             if covered >= COVERED:
                 notes.append(f"{one.kind.name} steers nothing by the tracking log: independent")
-                one = replace(one, kind=replace(one.kind, steering="independent", rank=0))
+                kind = replace(one.kind, steering="independent", rank=0, whole_way=True)
+                one = replace(one, kind=kind)
             else:
                 share = percent(covered, 2)
                 notes.append(f"{one.kind.name}: the tracking log is of {share} of its rows; what "

@@ -106,10 +106,10 @@ def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:
         return f", but in sessions of {lasts}, where the spec's horizon is {asked}"
     if claim.rests_on == "servo" and found.hard_bound_s is None:
         return ", but by the servo's own offsets, which hide a constant error of the path"
-    if claim.rests_on == "servo" and not found.source.whole_way:
-        return (f", but {found.source.name} is steered by these offsets, and nothing in the logs "
-                "bounds the rest of the way to the reference (a card's own error, the delay of a "
-                "pulse)")  # fmt: skip
+    if not found.source.whole_way:
+        return (f", but by {found.source.name} alone: nothing in these logs bounds the rest of the "
+                "way to the reference (a card's own error, the delay of a pulse that steers)"
+                )  # fmt: skip
     return ""
 
 

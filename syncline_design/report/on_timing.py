@@ -96,7 +96,17 @@ def _outcome(result: Timing) -> Outcome:
         return Outcome("bad", "\u2717", "No claim: the logs are in doubt")
     if not result.claim.made:
         return Outcome("warn", "!", "No claim yet")
+    if isinstance(result, TimingAndSpec) and _turns(result.spec):
+        words = f"Bound {numbers.time(result.bound_s)}, with which the spec no longer passes"
+        return Outcome("bad", "\u2717", words)
     return Outcome("good", "\u2713", f"Bound {numbers.time(result.bound_s)}")
+
+
+def _turns(meaning: TimingMeaning | None) -> bool:
+    """Whether the spec meets its requirements, and not with the measured clock."""
+    return meaning is not None and meaning.before == "meets" and meaning.after not in (
+        None, "meets",
+    )  # fmt: skip
 
 
 def _sentences(result: Timing) -> Iterator[str]:
