@@ -268,3 +268,17 @@ def test_every_file_of_a_bag_s_folder_is_evidence(tmp_path: Path) -> None:
     inside = {one.name: hashlib.sha256(one.read_bytes()).hexdigest() for one in bag.iterdir()}
     assert len(inside) > 1
     assert found == inside
+
+
+def test_stamps_beyond_64_bits_are_far_years_and_no_unit(tmp_path: Path) -> None:
+    """2**70 ns are 37 411 years; the rhythm and what else stamps show is told all the same."""
+    receive = START + np.cumsum(np.full(400, 100_000_000))
+    rows = [f"{2**70 + k * 100_000_000},{r + 2_000_000}" for k, r in enumerate(receive.tolist())]
+    path = tmp_path / "huge.csv"
+    path.write_text("stamp_ns,receive_ns\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    (row,) = audited(path)["streams"]
+    (fault,) = row["faults"]
+    assert (fault["fault"], fault["parameters"]["kind"]) == ("epoch_offset", "unknown")
+    assert fault["parameters"]["seconds"] == pytest.approx((2**70 - START) / 1e9, rel=1e-9)
+    assert "years after" in fault["evidence"]
+    assert row["rate_hz"] == pytest.approx(10.0, rel=1e-3)

@@ -68,3 +68,20 @@ def test_a_loaded_host_alone_is_no_fault(seed: int) -> None:
     rng = np.random.default_rng([79, seed])
     for rate_hz in (31.0, 180.0):
         assert named(of(*stream(rng, rate_hz))) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("bits", "unit_s"), [(16, 1e-3), (24, 1e-6), (20, 1e-4)])
+@pytest.mark.parametrize("rate_hz", [40.0, 150.0])
+def test_a_counter_that_wraps_once_is_named(
+    bits: int, unit_s: float, rate_hz: float, seed: int
+) -> None:
+    """Its range is exact by the stamps' rhythm, however receipts move where it begins anew."""
+    rng = np.random.default_rng([83, seed, bits, int(rate_hz)])
+    range_s = 2.0**bits * unit_s
+    at, receive = stream(rng, rate_hz, 1.1 * range_s)
+    begun = rng.uniform(0.2, 0.7) * range_s
+    found = of((at + begun) % range_s, receive)
+    by_name = {f.fault: f.parameters for f in found.faults}  # its zero is an epoch of its own
+    assert set(by_name) <= {"counter_wrap", "epoch_offset", "ahead_of_receipt"}
+    assert by_name["counter_wrap"] == {"wrap_s": pytest.approx(range_s), "count": 1.0}

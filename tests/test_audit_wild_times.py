@@ -113,3 +113,21 @@ def test_what_a_host_held_up_for_long_makes_no_receipt_behind_it_wrong(length_s:
     held = (when > 40.0) & (when < 40.0 + length_s)
     late = np.maximum.accumulate(np.maximum(receive, np.where(held, 40.0 + length_s, 0.0)))
     assert "wrong_receipts" not in {fault.fault for fault in of(when, late).faults}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("held_s", [0.06, 0.12, 0.2])
+def test_first_messages_that_a_host_held_up_as_it_does_others_are_right(
+    held_s: float, seed: int
+) -> None:
+    """A sensor of random intervals; the collector of a host's memory stops it every 3 to 15 s."""
+    rng = generator((61, seed, int(1e3 * held_s)))
+    when = np.cumsum(rng.exponential(0.025, 6000))
+    came = when + 1e-3 + rng.gamma(2.0, 5e-4, when.size)
+    begin = when[0] - 1e-3
+    while begin < when[-1]:
+        in_pause = (came >= begin) & (came < begin + held_s)
+        came[in_pause] = begin + held_s + 2e-4 * np.arange(in_pause.sum())
+        begin += rng.uniform(3.0, 15.0)
+    found = of(when, np.maximum.accumulate(came))
+    assert not any(fault.fault == "backward_jump" for fault in found.faults)

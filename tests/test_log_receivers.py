@@ -365,3 +365,12 @@ def test_damaged_reports_are_counted(tmp_path: Path) -> None:
     assert "the last line is cut" in recording.incomplete.reason
     with pytest.raises(BadInput, match="no time of a report"):
         opened(tmp_path, TPV.replace("10:00", "25:00").encode()).streams()
+
+
+@pytest.mark.parametrize("micros", [439_666, 439_200, 0, 999_999, 500_500])
+def test_a_time_of_the_week_may_be_cut_off_at_milliseconds(tmp_path: Path, micros: int) -> None:
+    """iTOW of some receivers is not rounded; UTC with `nano` tells the moment all the same."""
+    at = datetime(2026, 5, 4, 10, 0, 7, micros, tzinfo=UTC)
+    tow = (at + timedelta(seconds=18) - GPS_ZERO) // timedelta(milliseconds=1) % 604_800_000
+    stream = by_name(opened(tmp_path, pvt(at, iTOW=tow)))["NAV-PVT"]
+    assert stamps_of(stream) == [unix_ns(2026, 5, 4, 10, 0, 25, micro=micros)]

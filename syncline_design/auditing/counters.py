@@ -89,11 +89,15 @@ def unwrapped(series: Series) -> Continuous:
     period = float(np.median(change[change > 0])) if bool(np.any(change > 0)) else 0.0
     fallen = (expected - change)[falls]
     levels = _by_levels(series, places, falls, fallen)
+    noise = _noise(series, places, expected - change, even)
+    found = _range(fallen, stamp, noise, grain) if even else None
     if not even:
         fallen = levels
-    elif series.receive is not None:  # messages may be lost where the counter begins anew
+    elif series.receive is not None and (found is None or not found[0].name):
+        # messages may be lost where the counter begins anew; but levels move with a loaded host
         fallen = fallen + np.round((levels - fallen) / period) * period
-    found = _range(fallen, stamp, _noise(series, places, expected - change, even), grain)
+        found = None
+    found = found or _range(fallen, stamp, noise, grain)
     if found is None:
         return Continuous(series)
     wrap, matching = found

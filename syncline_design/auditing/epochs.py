@@ -61,6 +61,7 @@ _FACTORS: Final = tuple(sorted({
     one for value in (1.024, 2.0**20 / 1e6, 2.0**30 / 1e9, 10.0, 100.0, 1e4, 1e5, 1e7, 60.0, 3600.0)
     for one in (value, 1.0 / value)
 }))  # fmt: skip
+_YEAR_S: Final = 365.25 * 86_400.0
 LARGE_SLIP_S: Final = 15.0  # from here on another epoch, no pulse of the wrong second
 _WHOLE_LATENCY_S: Final = 0.1  # of a stream that is whole seconds off
 
@@ -85,6 +86,8 @@ def in_one_unit(series: Series, known: float = 1.0) -> InSeconds:
     factor = 1.0 if ratio is None or ratio <= 0.0 else _factor(series, ratio)
     if factor == 1.0 and known == 1.0:
         return InSeconds(series, None, 1.0, ratio)
+    if abs(factor * known - 1.0) < 1e-9:
+        return _of_far_years(series, known, ratio)
     good = series.good
     stamp = series.stamp.copy()
     if factor >= 10.0 and float(factor).is_integer():
@@ -101,6 +104,25 @@ def in_one_unit(series: Series, known: float = 1.0) -> InSeconds:
     )  # fmt: skip
     rate = None if ratio is None else ratio / factor
     return InSeconds(replace(series, stamp=stamp), fault, max(1.0, float(round(1.0 / whole))), rate)
+
+
+def _of_far_years(series: Series, known: float, ratio: float | None) -> InSeconds:
+    """Stamps in the right unit that 64 bits of nanoseconds do not hold: no clock is so far off.
+
+    They are put to where the receipts begin, as no other epoch can be told.
+    """
+    assert series.receive is not None  # nothing else tells a rate
+    good, stamp = series.good, series.stamp.copy()
+    first = int(np.flatnonzero(good)[0])
+    begins, received = int(stamp[first]), int(series.receive[first])
+    stamp[good] = (stamp[good] - begins) * round(known) + received
+    ahead = float(begins) * known / NS - received / NS
+    fault = StampFault(
+        "epoch_offset", {"kind": "unknown", "seconds": ahead}, None, None,
+        f"stamps are {to_digits(abs(ahead) / _YEAR_S, 4)} years "
+        f"{'after' if ahead > 0 else 'before'} their receipts: no time of any calendar",
+    )  # fmt: skip
+    return InSeconds(replace(series, stamp=stamp), fault, float(round(known)), 1.0)
 
 
 def _factor(series: Series, ratio: float) -> float:

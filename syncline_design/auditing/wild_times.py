@@ -29,6 +29,7 @@ _SPREADS: Final = 20.0  # of the delays
 _MOST: Final = 0.05  # of all messages: more are how the stream is
 _WIDE, _LOW = 600, 5.0  # messages, per cent of them: no host holds up all of so many
 _AT_ONCE: Final = 1 << 14  # windows, each of which is held whole while its middle is looked for
+_HELD_UP: Final = 2.0  # times as long as any other message of the log
 _AT_END: Final = 3  # messages: a clock that was set is told by four
 _OLD_S: Final = 5.0  # by which a message may be held up on its way while others pass
 _STEADY: Final = 0.5  # of an interval
@@ -102,7 +103,7 @@ def _wrong_of(
     low, high = int(stamp[beside].min()) - reach, int(stamp[beside].max()) + reach
     if np.any(own < low) or np.any(own > high):
         known = _is_another(own, stamp[beside], off)
-        return None if known or not _is_no_transport(off, run, stamp.size) else "stamp"
+        return None if known or not _is_no_transport(away, run) else "stamp"
     put_back = own + np.round(off * NS).astype(np.int64)
     if np.all((put_back >= low) & (put_back <= high)) and _is_slip(off):
         return None  # of events that come seldom: their stamps may be as wrong
@@ -132,12 +133,18 @@ def _receipts_jump(
     return all(of_stamps < of_receipts for of_stamps, of_receipts in zip(*odd, strict=True))
 
 
-def _is_no_transport(off: Array, run: tuple[int, int], size: int) -> bool:
-    """Whether stamps lie farther off than messages that were held up, or overtaken, do."""
+def _is_no_transport(away: Array, run: tuple[int, int]) -> bool:
+    """Whether stamps lie farther off than messages that were held up, or overtaken, do.
+
+    The first of a log may have waited for what held up others of it as well.
+    """
     begin, end = run
+    off = away[begin:end]
     if float(np.abs(off).min()) > _OLD_S:
         return end - begin <= LONGEST_SPIKE or bool(np.all(off > 0.0))
-    return begin == 0 or (end == size and bool(np.all(off < 0.0)))
+    if begin == 0:
+        return bool(np.any(off < 0.0)) or float(off.max()) > _HELD_UP * float(away[end:].max())
+    return end == away.size and bool(np.all(off < 0.0))
 
 
 def _is_another(own: NDArray[np.int64], beside: NDArray[np.int64], off: Array) -> bool:

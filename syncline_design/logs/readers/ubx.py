@@ -216,5 +216,15 @@ def tow_ns(key: bytes, row: Any) -> int:
     if "fTOW" in names and abs(int(row["fTOW"])) < MS:
         rest = int(row["fTOW"])
     elif "nano" in names and utc_ns(row) is not None:
-        rest = (int(row["nano"]) + MS // 2) % MS - MS // 2  # what rounding to ms took away
+        rest = _taken_away(tow_ms * MS, int(row["nano"]))
     return tow_ms * MS + rest
+
+
+def _taken_away(tow_ns: int, nano: int) -> int:
+    """What iTOW lacks of the moment [ns], whether it was rounded to a millisecond or cut off there.
+
+    UTC and the time of the week differ by whole seconds, so that `nano` tells the fraction.  Of a
+    fraction that is further off only the digits below a millisecond count.
+    """
+    apart = (nano - tow_ns + NANO // 2) % NANO - NANO // 2
+    return apart if abs(apart) <= MS else (nano + MS // 2) % MS - MS // 2
