@@ -60,10 +60,15 @@ class InDoubt:
     may_be_sound: bool = False
 
     def words_of(self, own: Sequence[OneWay]) -> str:
-        """What a row is told of it that some of the ways would break."""
+        """What a row is told of it that some of the ways would break.
+
+        The way that was found is told in the words of the finding, the others by their figures.
+        """
         others = " or ".join(way.name for way in self.ways if way not in own)
-        mine = " or ".join(way.words for way in own)
-        return f"it is {mine}, or {others}: this log cannot tell which ({self.found})"
+        first = self.ways[0]
+        mine = " or ".join(way.name if way is first else way.words for way in own)
+        said = f" ({self.found})" if first in own else ""
+        return f"it is {mine}, or {others}: this log cannot tell which{said}"
 
 
 @dataclass(frozen=True, slots=True)
