@@ -17,7 +17,12 @@ from syncline_design.diagnosis.result import Estimate, Finding, Rival
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.effects.record import Effect
-from syncline_design.model.figure_text import format_estimate, format_nats, percent
+from syncline_design.model.figure_text import (
+    format_components,
+    format_estimate,
+    format_nats,
+    percent,
+)
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.normal import NORMAL_95
 
@@ -47,6 +52,16 @@ def estimate(
     return Estimate(value, spread, unit, seen, text, interval95)
 
 
+def _shown(parameters: Mapping[str, Estimate]) -> dict[str, str]:
+    """Texts for a sentence: the components of one vector in one unit."""
+    seen = {
+        name: (one.value, one.standard_uncertainty, one.unit)
+        for name, one in parameters.items()
+        if one.seen and not isinstance(one.value, str)
+    }
+    return {name: one.text for name, one in parameters.items()} | format_components(seen)
+
+
 def finding(
     effect: Effect,
     sensor: str,
@@ -60,8 +75,7 @@ def finding(
     size_m: float | None = None,
 ) -> Finding:
     """A missing effect in words; rivals: aliases, lookalikes, excluded."""
-    shown = {name: one.text for name, one in parameters.items()}
-    text = effect.in_words(WORDS[sensor], shown)
+    text = effect.in_words(WORDS[sensor], _shown(parameters))
     return Finding(
         effect.name,
         sensor,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from syncline_design.model.unit_table import DEG, LADDERS, UNITS, Dimension
@@ -17,6 +17,7 @@ _ESTIMATE_LADDERS: dict[str, tuple[tuple[str, float], ...]] = {
     "m/(m/s2)": (("m/(m/s2)", 1.0), ("mm/(m/s2)", 1e-3)),
     "": (("", 1.0), ("ppm", 1e-6)),
 }
+_VECTORS = (("x", "y", "z"), ("north", "east", "down"), ("roll", "pitch", "yaw"))  # first words
 _LEAST_SHARE = 1e-6  # that is told as a figure
 
 
@@ -96,6 +97,21 @@ def format_estimates(
     """Values with their uncertainties in one unit, that of the largest value, to be compared."""
     name, scale = _rung(max((abs(value) for value, _ in column), default=0.0), unit)
     return tuple(_estimate(value, spread, name, scale) for value, spread in column)
+
+
+def format_components(
+    figures: Mapping[str, tuple[float, float | None, str]],
+) -> dict[str, str]:
+    """Parameters (value, uncertainty, unit) by name; the components of one vector in the unit of
+    its largest: `-0.16 ± 0.21 cm forward, 17.67 ± 0.28 cm right`."""
+    shown = {name: format_estimate(*one) for name, one in figures.items()}
+    for axes in _VECTORS:
+        parts = [name for name in figures if name.split("_")[0] in axes]
+        units = {figures[name][2] for name in parts}
+        if len(units) == 1:
+            told = format_estimates([figures[name][:2] for name in parts], units.pop())
+            shown |= zip(parts, told, strict=True)
+    return shown
 
 
 def _rung(size: float, unit: str) -> tuple[str, float]:

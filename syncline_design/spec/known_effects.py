@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from syncline_design.machine.sentences import one_of
-from syncline_design.model.figure_text import format_estimate
+from syncline_design.model.figure_text import format_components
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import problem_at
@@ -63,8 +63,10 @@ def describe(entry: EffectEntry) -> str:
 
     effect = registry()[entry.effect]
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
-    shown = {
-        name: value if isinstance(value, str) else format_estimate(value, None, units.get(name, ""))
+    words = {name: value for name, value in entry.parameters if isinstance(value, str)}
+    figures = {
+        name: (value, None, units.get(name, ""))
         for name, value in entry.parameters
+        if not isinstance(value, str)
     }
-    return effect.in_words(entry.sensor, shown)
+    return effect.in_words(entry.sensor, words | format_components(figures))
