@@ -48,6 +48,7 @@ from syncline_design.campaign.scatter import (
     scattered,
 )
 from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -95,12 +96,14 @@ class Group:
 @dataclass(frozen=True, eq=False)
 class Differing:
     """An effect that differs from run to run, and the covariance (p, p) by which it does beyond
-    noise; named, named_covariance: the same of the commonest that differs as clearly."""
+    noise; named, named_covariance: the same of the commonest that differs as clearly.  log_p: log
+    of the chance that the named one differs so much by noise alone, all effects counted."""
 
     term: Term
     covariance: Array
     named: Term
     named_covariance: Array
+    log_p: float
 
     @property
     def spread(self) -> Array:
@@ -362,11 +365,13 @@ class Changes:
     def _scattering(self, runs: Runs) -> Differing | None:
         """The effect that differs most clearly from run to run; None where noise would do.  One
         change is none: runs are parted at any."""
-        clear, excess = np.zeros(len(self.terms)), np.zeros(len(self.terms))
+        clear, excess, chance = (np.zeros(len(self.terms)) for _ in range(3))
         for g, scatter in zip(self.groups, runs.scatters, strict=True):
             least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
             clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
             excess[g.terms] = least / np.where(free > 0.0, free, np.inf) - 1.0
+            pairs = zip(least, free, strict=True)
+            chance[g.terms] = [log_p_of(float(q), int(f)) if f > 0.0 else 0.0 for q, f in pairs]
         best = int(np.argmax(clear))
         if not clear[best] > SCATTERED:
             return None
@@ -378,6 +383,7 @@ class Changes:
             excess[best] * _own_covariance(usual, self.terms[best]),
             self.terms[named],
             excess[named] * _own_covariance(usual, self.terms[named]),
+            float(chance[named]) + math.log(len(self.terms)),
         )
 
     def _total(self, look: int, normal: Array, score: Array) -> Array:

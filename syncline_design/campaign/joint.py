@@ -7,8 +7,8 @@ from pathlib import Path
 
 from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.kept import Run
-from syncline_design.campaign.naming import Naming
-from syncline_design.campaign.pool import pool_of
+from syncline_design.campaign.naming import NamedTogether, Naming
+from syncline_design.campaign.pool import Pool, pool_of
 from syncline_design.campaign.store import (
     Entry,
     Stored,
@@ -19,6 +19,7 @@ from syncline_design.campaign.store import (
 )
 from syncline_design.campaign.telling import Told, tell
 from syncline_design.campaign.twice import is_same
+from syncline_design.campaign.unlike import unlike_logs
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
@@ -103,13 +104,27 @@ def _together(
     entries: Sequence[Entry],
     before: int,
 ) -> Diagnosis:
-    pool = pool_of([one.found for one in entries], [one.start for one in entries])
-    named = Naming(
-        pool, settings.false_alarm_rate, settings.max_effects, settings.exclude_effects
-    ).named()
+    left_out = {} if stored is None else stored.left_out
+    entries = [one for one in entries if one.number not in left_out]
+    if not entries:
+        raise JointError("--joint: every run of the store is left out; expected one that counts")
+    pool, named = _named(entries, settings)
+    unlike = unlike_logs(pool, [one.scoped.term for one in named.terms])
+    odd = tuple((entries[one.run], one) for one in unlike)
+    if odd:
+        apart = {entry.number for entry, _ in odd}
+        entries = [one for one in entries if one.number not in apart]
+        pool, named = _named(entries, settings)
     last = None if request.store is None else read_store(request.store, stored)
     return tell(Told(case, settings, tuple(entries), before, pool, named,
-                     last, 0 if stored is None else stored.torn))  # fmt: skip
+                     last, 0 if stored is None else stored.torn, odd))  # fmt: skip
+
+
+def _named(entries: Sequence[Entry], settings: DiagnosisSettings) -> tuple[Pool, NamedTogether]:
+    """Runs side by side, and what they name together."""
+    pool = pool_of([one.found for one in entries], [one.start for one in entries])
+    naming = Naming(pool, settings.false_alarm_rate, settings.max_effects, settings.exclude_effects)
+    return pool, naming.named()
 
 
 def _demand_different(request: JointRequest, stored: Stored | None) -> None:

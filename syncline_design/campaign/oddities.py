@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
@@ -11,6 +12,7 @@ from syncline_design.campaign.changes import Change, Changes
 from syncline_design.campaign.store import Entry
 from syncline_design.model.figure_text import format_estimate, to_digits
 
+DIFFERS: Final = 0.01  # chance, over all looks, that runs of one value are said to differ
 NOISIER: Final = 1.5  # times the median of the runs before
 KNOWN: Final = 2  # runs from which a date long before theirs is odd
 LONG_BEFORE_S: Final = 30 * 86_400.0  # that an older log may be added late by without a word
@@ -77,9 +79,14 @@ def _dated_long_before(runs: Sequence[Entry]) -> Iterator[str]:
             yield (
                 f"run {entry.number} ({entry.run.files[0]}) is dated {entry.run.date}, "
                 f"{to_digits(early_s / DAY_S, 3)} days before all that were added before it, and "
-                "is taken for what came first: is its clock right? A store forgets no run: "
-                "begin another without it"
+                "is taken for what came first: is its clock right? If not: `watch STORE "
+                f"--leave-out {entry.number} --reason TEXT`"
             )
+
+
+def _share(look: int) -> float:
+    """Share of the false words that a look may have: 2 / (n (n - 1)), which sums to 1 from 3 on."""
+    return 2.0 / (look * (look - 1.0))
 
 
 def _differing(
@@ -91,7 +98,7 @@ def _differing(
     told = {one.term.label for one in seen}
     for found in changes.differing(look):
         term = found.named
-        if term.label in told:
+        if term.label in told or found.log_p > math.log(DIFFERS * _share(look)):
             continue
         sizes = " and ".join(
             format_estimate(float(to_digits(float(size), 2)), None, one.unit)

@@ -1,6 +1,7 @@
 """The runs of one system on disk: a file of lines that only grows, each bound to all before it.
 
-Lines are runs, baselines, and what looks at the runs found (`looks`).
+Lines are runs, baselines, what looks at the runs found (`looks`), and runs that are left out from
+there on (`left_out`): a run stays in the file, and is counted no more.
 
 A line is {"previous": P, "sha256": H, "body": B}; P is the H of the line before (64 zeros at the
 start), H the SHA-256 of P and of B in canonical JSON.  A line that was changed, taken out, put in
@@ -17,6 +18,7 @@ import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -57,11 +59,20 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
+class LeftOut:
+    """That a run is counted no more: since when, and why."""
+
+    since: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Stored:
     """A store that was read.
 
     system: what it is a store of (`same_system.description`).  baselines: after how many runs a
-    new baseline was set.  looks: what looks found, by their keys.  torn: bytes of a last line that
+    new baseline was set.  looks: what looks found, by their keys.  left_out: runs that are counted
+    no more, by their numbers.  torn: bytes of a last line that
     a kill left without its end.  last: hash of the last line.  content: all whole lines.
     """
 
@@ -71,6 +82,7 @@ class Stored:
     entries: tuple[Entry, ...]
     baselines: tuple[int, ...]
     looks: Mapping[str, KeptLook]
+    left_out: Mapping[int, LeftOut]
     torn: int
     last: str
     content: bytes = field(repr=False)
@@ -78,6 +90,17 @@ class Stored:
     @property
     def runs(self) -> tuple[Run, ...]:
         return tuple(one.run for one in self.entries)
+
+    @property
+    def counted(self) -> tuple[Entry, ...]:
+        """The runs that are not left out."""
+        return tuple(one for one in self.entries if one.number not in self.left_out)
+
+    def left_out_words(self) -> Iterator[str]:
+        """What is left out, in sentences without their full stop."""
+        for number, one in sorted(self.left_out.items()):
+            files = ", ".join(self.entries[number - 1].run.files)
+            yield f"run {number} ({files}) is left out since {one.since}: {one.reason}"
 
 
 def read_store(path: Path, known: Stored | None = None) -> Stored | None:
@@ -109,11 +132,12 @@ def _stored(path: Path, content: bytes, known: Stored | None) -> Stored | None:
     entries: list[Entry] = []
     baselines: list[int] = []
     looks: dict[str, KeptLook] = {}
+    left_out: dict[int, LeftOut] = {}
     if known is not None and kept.startswith(known.content):
         first, rest = 1 + known.content.count(b"\n"), kept[len(known.content) :]
         name, system, last = known.name, known.system, known.last
         entries, baselines = list(known.entries), list(known.baselines)
-        looks = dict(known.looks)
+        looks, left_out = dict(known.looks), dict(known.left_out)
     for line, text in enumerate(rest.splitlines(), first):
         body, last = _checked(path, line, text, last)
         kind = body.get("kind")
@@ -125,11 +149,15 @@ def _stored(path: Path, content: bytes, known: Stored | None) -> Stored | None:
             baselines.append(len(entries))
         elif kind == "looks":
             looks |= _looks(path, line, body)
+        elif kind == "left_out":
+            left_out |= _left_out(path, line, body, len(entries))
         else:
-            raise refused(path, f"a line of kind {kind!r}", "run, baseline or looks", line)
+            expected = "run, baseline, looks or left_out"
+            raise refused(path, f"a line of kind {kind!r}", expected, line)
     if system is None:
         return None  # nothing but what a kill left of the first line
-    return Stored(path, name, system, tuple(entries), tuple(baselines), looks, torn, last, kept)
+    return Stored(path, name, system, tuple(entries), tuple(baselines), looks, left_out, torn,
+                  last, kept)  # fmt: skip
 
 
 def _checked(path: Path, line: int, text: bytes, previous: str) -> tuple[dict[str, Any], str]:
@@ -176,6 +204,17 @@ def _looks(path: Path, line: int, body: dict[str, Any]) -> dict[str, KeptLook]:
     except (NotThisResultError, KeyError, TypeError) as error:
         raise _unreadable(path, line, "looks", error) from None
     return {one.key: one for one in found}
+
+
+def _left_out(path: Path, line: int, body: dict[str, Any], runs: int) -> dict[int, LeftOut]:
+    try:
+        number = int(body["run"])
+        found = LeftOut(str(body["since"]), str(body["reason"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise _unreadable(path, line, "a run that is left out", error) from None
+    if not 1 <= number <= runs:
+        raise refused(path, f"damaged: run {number} is left out, and there are {runs}", "", line)
+    return {number: found}
 
 
 def _unreadable(path: Path, line: int, what: str, error: Exception) -> BadInput:
@@ -278,6 +317,24 @@ def add_baseline(path: Path) -> None:
         if stored is None:
             raise refused(path, "no store to accept", "a store with runs")
         return _line(stored.last, {"kind": "baseline", "after": len(stored.entries)})[0]
+
+    append_line(path, line)
+
+
+def add_left_out(path: Path, number: int, reason: str) -> None:
+    """Append that a run is counted no more, and why."""
+    since = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+    def line(kept: bytes) -> bytes:
+        stored = _stored(path, kept, None)
+        if stored is None or not 1 <= number <= len(stored.entries):
+            runs = 0 if stored is None else len(stored.entries)
+            raise refused(path, f"there is no run {number} to leave out", f"one of {runs} runs")
+        if number in stored.left_out:
+            known = stored.left_out[number]
+            raise refused(path, f"run {number} is left out since {known.since} already")
+        body = {"kind": "left_out", "run": number, "since": since, "reason": reason}
+        return _line(stored.last, body)[0]
 
     append_line(path, line)
 

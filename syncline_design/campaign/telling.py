@@ -13,6 +13,7 @@ from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.campaign.sight import limits_of
 from syncline_design.campaign.store import Entry, Stored
+from syncline_design.campaign.unlike import RATE, UnlikeLog
 from syncline_design.diagnosis.consequence import Weights, promise_of
 from syncline_design.diagnosis.finding import estimate, evidence_words, finding
 from syncline_design.diagnosis.gap_result import Remaining, WholeGap
@@ -34,6 +35,7 @@ from syncline_design.diagnosis.result import (
     PerLog,
     Rival,
     SpecRead,
+    UnlikeOthers,
 )
 from syncline_design.diagnosis.run import provenance_of
 from syncline_design.diagnosis.same_system import description
@@ -62,6 +64,7 @@ class Told:
     named: NamedTogether
     stored: Stored | None
     torn: int
+    unlike: tuple[tuple[Entry, UnlikeLog], ...] = ()
 
     @property
     def stages(self) -> list[str]:
@@ -88,7 +91,9 @@ def tell(told: Told) -> Diagnosis:
     left_m = max((run.left_m for run in told.runs), default=0.0)
     odd = any(run.left_material for run in told.runs)
     explained = any(f.material for f in found)
-    verdict: LogOutcome = "unexplained" if odd else "explained" if explained else "agrees"
+    verdict: LogOutcome = "explained" if explained else "agrees"
+    if odd or (told.unlike and not explained):
+        verdict = "unexplained"
     shown = tuple(_seen(told))
     return Diagnosis(
         verdict=verdict,
@@ -329,4 +334,16 @@ def _joint(told: Told) -> Joint:
     stored = told.stored
     return Joint(logs, len({e.start for e in told.entries}),
                  None if stored is None else str(stored.path),
-                 None if stored is None else stored.last, told.torn)  # fmt: skip
+                 None if stored is None else stored.last, told.torn,
+                 tuple(_unlike(told)) or None, RATE if told.unlike else None,
+                 None if stored is None else tuple(stored.left_out_words()) or None)  # fmt: skip
+
+
+def _unlike(told: Told) -> Iterator[UnlikeOthers]:
+    """Logs that are unlike all the others."""
+    for entry, one in told.unlike:
+        name, sensor, stage = one.term.label
+        differs = _estimates(one.term, one.judged)
+        chance = one.log_p / math.log(10.0)
+        yield UnlikeOthers(entry.number, entry.run.files, name, sensor, told.stages[stage], differs,
+                           chance)  # fmt: skip

@@ -37,7 +37,8 @@ class WatchedRun(Record):
     """One run: its number from 1 in the order of adding, and what it tells alone.
 
     baseline: which baseline it belongs to, from 1.  e_value: the evidence for a change up to this
-    run, since its baseline; null of the first.  new: whether this call added it.
+    run, since its baseline; null of the first.  new: whether this call added it.  left_out: true
+    of a run that is counted no more.
     """
 
     run: int
@@ -51,6 +52,7 @@ class WatchedRun(Record):
     e_value: float | None
     new: bool
     values: tuple[RunValue, ...]
+    left_out: bool | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

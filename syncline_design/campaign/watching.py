@@ -24,6 +24,7 @@ from syncline_design.campaign.store import (
     Entry,
     Stored,
     add_baseline,
+    add_left_out,
     add_looks,
     add_run,
     by_date,
@@ -121,6 +122,16 @@ def accept(store: Path) -> Stored:
     return found
 
 
+def leave_out(store: Path, run: int, reason: str) -> Stored:
+    """Count a run of a store no more; it stays in the file."""
+    if not reason.strip():
+        raise refused(store, "no reason to leave a run out", "a reason, which every look repeats")
+    add_left_out(store, run, reason.strip())
+    found = read_store(store)
+    assert found is not None
+    return found
+
+
 def _add(
     case: Case,
     request: WatchRequest,
@@ -161,7 +172,7 @@ class Watching:
     def ordered(self) -> tuple[Entry, ...]:
         """Runs of the last baseline, in their order."""
         after = self.stored.baselines[-1] if self.stored.baselines else 0
-        return tuple(by_date(tuple(e for e in self.stored.entries if e.number > after)))
+        return tuple(by_date(tuple(e for e in self.stored.counted if e.number > after)))
 
     @cached_property
     def pool(self) -> Pool:
@@ -279,7 +290,8 @@ class Watching:
 
     def _cautions(self) -> tuple[str, ...]:
         seen = [one.change for one in self.seen]
-        return tuple(cautions(self.ordered, self.doubted, self.changes, seen, self._stage))
+        odd = cautions(self.ordered, self.doubted, self.changes, seen, self._stage)
+        return (*self.stored.left_out_words(), *odd)
 
     def _stage(self, index: int) -> str:
         return self.case.spec.stages[index].name
@@ -352,6 +364,7 @@ class Watching:
                 baseline=1 + sum(after < entry.number for after in self.stored.baselines),
                 e_value=None if known is None else math.exp(min(known, 690.0)),
                 new=entry.number > self.before,
+                left_out=True if entry.number in self.stored.left_out else None,
                 values=() if k is None else tuple(map(self._told, values[k])),
             )
 

@@ -39,6 +39,18 @@ def watch(
         bool,
         typer.Option("--accept", help="After a repair: hold later runs against one another only."),
     ] = False,
+    leave_out: Annotated[
+        int | None,
+        typer.Option(
+            "--leave-out",
+            min=1,
+            help="Count the run of this number no more; it stays in the store.",
+            show_default=False,
+        ),
+    ] = None,
+    reason: Annotated[
+        str, typer.Option("--reason", help="Why a run is left out.", show_default=False)
+    ] = "",
     output: WatchOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
@@ -61,6 +73,10 @@ def watch(
 ) -> int:
     """Add a run to those of a system, and say what changed since when."""
     deadline = deadline_of(time_limit)
+    if leave_out is not None and accept:
+        refuse("syncline-design: watch: --accept and --leave-out are two calls")
+    if leave_out is not None:
+        return _leave_out(store, leave_out, reason, spec, output, quiet=quiet)
     if accept:
         return _accept(store, spec, output, quiet=quiet)
     if spec is None:
@@ -83,6 +99,23 @@ def watch(
     emit(console(on_watch(found)), targets, lambda name: render_watch(name, found), quiet=quiet,
          charts=lambda: {"": on_watch(found)})  # fmt: skip
     return found.demanded_exit_code(informative=require_informative)
+
+
+def _leave_out(
+    store: Path, run: int, reason: str, spec: Path | None, output: list[str] | None, *, quiet: bool
+) -> int:
+    """A run that counts no more, said in a line."""
+    if spec is not None or output:
+        refuse("syncline-design: watch STORE --leave-out N --reason TEXT takes nothing else")
+    if not reason.strip():
+        refuse("syncline-design: watch --leave-out: expected --reason TEXT, which every later look "
+               "repeats")  # fmt: skip
+    from syncline_design.campaign.watching import leave_out as leave_run_out
+
+    stored = leave_run_out(store, run, reason)
+    text = f"{store}: " + "; ".join(stored.left_out_words())
+    emit(text, [], lambda name: name, quiet=quiet)
+    return 0
 
 
 def _accept(store: Path, spec: Path | None, output: list[str] | None, *, quiet: bool) -> int:

@@ -377,11 +377,30 @@ class LogAlone(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class UnlikeOthers(Record):
+    """A log that is unlike all the others, and the effect in which it differs most clearly.
+
+    differs: by how much from what the others together say, by parameter.  log10_chance: of so
+    much by noise alone, over all logs and effects.
+    """
+
+    number: int
+    files: tuple[str, ...]
+    effect: str
+    sensor: str
+    stage: str
+    differs: Mapping[str, Estimate]
+    log10_chance: float
+
+
+@dataclass(frozen=True, slots=True)
 class Joint(Record):
     """Several logs of one system, taken together.
 
     starts: how many starts of the system they are of.  store: the file that keeps their
     statistics; last: hash of its last line.  torn: bytes at its end that a kill had left.
+    unlike: logs that are unlike all others, and not among `logs`; unlike_rate: the chance that any
+    of several alike logs is said to be.  left_out: runs of the store that count no more, in words.
     """
 
     logs: tuple[LogAlone, ...]
@@ -389,6 +408,9 @@ class Joint(Record):
     store: str | None
     last: str | None
     torn: int
+    unlike: tuple[UnlikeOthers, ...] | None = optional()
+    unlike_rate: float | None = optional()
+    left_out: tuple[str, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
@@ -12,6 +12,7 @@ from syncline_design.diagnosis.result import (
     Diagnosis,
     LogRead,
     NextDrive,
+    UnlikeOthers,
 )
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
@@ -40,7 +41,7 @@ from syncline_design.report.on_findings import (
     spaced,
 )
 from syncline_design.report.on_gap import closed_text, gap_nodes, rms_length
-from syncline_design.report.on_joint import joint_nodes
+from syncline_design.report.on_joint import joint_nodes, unlike_words
 from syncline_design.report.on_repairs import repair_nodes
 from syncline_design.report.on_residuals import residual_nodes
 from syncline_design.report.table import Cell, Table, table
@@ -74,7 +75,7 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
         family="Diagnosis",
         outcome=outcome_of(found),
         name=found.spec.name if found.spec is not None else "Measured log against simulation",
-        sentences=(sentence_text(found),),
+        sentences=(*_unlike(found), sentence_text(found)),
         facts=tuple(_facts(found)),
         sections=(
             *section("findings", "What is missing", finding_nodes(found), "Findings"),
@@ -131,15 +132,30 @@ def _unseen(found: Diagnosis) -> list[Node]:
     return [Items(tuple(effect_words(line) for line in found.unseen))] if found.unseen else []
 
 
+def _unlike(found: Diagnosis) -> Iterator[str]:
+    """Logs that are unlike the others they were given with."""
+    for one in () if found.joint is None else found.joint.unlike or ():
+        words = unlike_words(one)
+        yield f"{words[0].upper()}{words[1:]}."
+
+
 def outcome_of(found: Diagnosis) -> Outcome:
     """The verdict's words; a log that contradicts itself is said to, whatever was named."""
     if not found.sound:
         return _UNSOUND
+    if found.joint is not None and found.joint.unlike:
+        return _unlike_outcome(found.joint.unlike)
     known, times = DIAGNOSES[found.verdict], _times_expected(found.gap)
     if found.verdict != "explained" or times <= LARGE:
         return known
     more = f"{known.word}, {numbers.number(times, 2)} times what the spec expects"
     return Outcome(known.tone, known.mark, more)
+
+
+def _unlike_outcome(unlike: Sequence[UnlikeOthers]) -> Outcome:
+    logs = sentence_list([str(one.number) for one in unlike])
+    said = f"Logs {logs} are" if len(unlike) > 1 else f"Log {logs} is"
+    return Outcome("warn", "!", f"{said} unlike the others: below is what the others say together")
 
 
 def _times_expected(gap: Gap) -> float:

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from syncline_design.diagnosis.result import Estimate, Finding, Joint, LogAlone
+from syncline_design.diagnosis.result import Estimate, Finding, Joint, LogAlone, UnlikeOthers
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.figure_text import format_estimates
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
-from syncline_design.report.document import Chart, Node, Text, code, show
+from syncline_design.report.document import Chart, Items, Node, Text, code, show
 from syncline_design.report.table import Cell, table
 
 MOST_LOGS: Final = 12  # told outside the page
@@ -93,6 +94,21 @@ def latest(
     return nodes
 
 
+def unlike_words(one: UnlikeOthers) -> str:
+    """`log 4 (d.csv) is unlike the others: latency (position) differs there by ...`."""
+    parts = [f"{split_suffix(name)[0].replace('_', ' ')} by {own.text}"
+             for name, own in one.differs.items() if own.seen]  # fmt: skip
+    chance = f"{numbers.number(10.0 ** max(one.log10_chance, -300.0), 2)}"
+    if one.log10_chance < -300.0:
+        chance = f"less than {chance}"
+    what = f"{one.effect.replace('_', ' ')} ({one.sensor})"
+    return (
+        f"log {one.number} ({', '.join(one.files)}) is unlike the others: {what} differs there, "
+        f"{sentence_list(parts)}; noise alone does that with a chance of "
+        f"{chance}, all logs and effects counted. What is said here is what the others say together"
+    )
+
+
 def joint_nodes(joint: Joint | None) -> list[Node]:
     """Every log by itself, and where their statistics are kept."""
     if joint is None:
@@ -102,6 +118,9 @@ def joint_nodes(joint: Joint | None) -> list[Node]:
              "Alone", "Named alone")  # fmt: skip
     rows = [_row(one, several=several) for one in joint.logs]
     nodes = latest("The logs", heads, rows, MOST_LOGS)
+    said = (*map(unlike_words, joint.unlike or ()), *(joint.left_out or ()))
+    if said:
+        nodes = [Items(tuple(f"{one}." for one in said), "!", "warn"), *nodes]
     if joint.starts == len(joint.logs) > 1:
         words = "Each log is a start of its own, so what differs by start differs by log."
         nodes.append(Text(words, quiet=True))

@@ -80,7 +80,7 @@ def _outcome(found: Watch) -> Outcome:
     if not found.alarms and looks < FEWEST_RUNS:
         return Outcome("warn", "?", f"Too few runs to tell ({looks} of {FEWEST_RUNS})")
     if not found.alarms and _shows_no_delay(found):
-        last = _compared(found)[-1].run
+        last = _last(found).run
         return Outcome("warn", "?", f"Nothing seen to change, but run {last} shows no delay at all")
     if not found.alarms:
         return Outcome("good", "\u2713", f"Nothing changed in {looks} run{'s'[: looks != 1]}")
@@ -91,7 +91,7 @@ def _outcome(found: Watch) -> Outcome:
 
 def _looks(found: Watch) -> int:
     """Runs since the baseline, which are held against one another."""
-    return len([r for r in found.runs if r.run > found.baseline_after])
+    return len([r for r in found.runs if r.run > found.baseline_after and not r.left_out])
 
 
 def _name(one: Alarm | BlindSpot) -> str:
@@ -129,7 +129,7 @@ def _shows_no_delay(found: Watch) -> bool:
 
 def _blind(found: Watch) -> str:
     """`Run 13 (P13.csv) could not have shown ...`."""
-    last = _compared(found)[-1]
+    last = _last(found)
     names = sorted({_name(one) for one in found.informative.blind_to})
     return (
         f"Run {last.run} ({last.files[0]}) could not have shown every change that would turn a "
@@ -207,6 +207,12 @@ def _compared(found: Watch) -> list[WatchedRun]:
     return sorted(found.runs, key=lambda one: (one.baseline, one.date or "", one.run))
 
 
+def _last(found: Watch) -> WatchedRun:
+    """The last run that counts."""
+    every = _compared(found)
+    return next((one for one in reversed(every) if not one.left_out), every[-1])
+
+
 def _evidence(found: Watch) -> list[Node]:
     runs = [r for r in _compared(found) if r.e_value is not None]
     if len(runs) < 2:
@@ -257,7 +263,7 @@ def _runs(found: Watch) -> list[Node]:
 
 def _row(one: WatchedRun) -> Sequence[Cell | str]:
     e_value = "" if one.e_value is None else e_value_text(one.e_value)
-    mark = "+" if one.new else ""
+    mark = "\u2013" if one.left_out else "+" if one.new else ""
     return (Cell(str(one.run), one.run, mark=mark), ", ".join(one.files), one.date or "",
             Cell(numbers.count(one.rows), one.rows), one.verdict, "; ".join(one.named),
             Cell(e_value, one.e_value))  # fmt: skip

@@ -1,0 +1,112 @@
+"""Logs that are unlike all the others: another vehicle's, or one of a day on which something moved.
+
+Of each log and effect the likelihood ratio of a value of its own in that log against one value in
+all logs, the others common to all; over the scatter of parts, chi-square where there is none.  A
+log is unlike where the chance of that, times logs and effects (Bonferroni), is below `RATE`.  What
+is left has to agree: where it does not, an effect differs from log to log, and none is unlike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.naming import ratio
+from syncline_design.campaign.pool import Pool, Scoped, Term, fitted
+from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.judged import Judged
+from syncline_design.diagnosis.scores import log_p_of
+from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
+
+RATE: Final = 0.01  # chance that any of several alike logs is said to be unlike
+FEWEST: Final = 3  # logs: of two that differ neither is the odd one
+AS_GOOD_NATS: Final = 2.0
+LEAST_GAIN: Final = 3.0  # nat, below which no chance is worked out
+
+
+@dataclass(frozen=True, eq=False)
+class UnlikeLog:
+    """A log, by its place, and the effect in which it differs most clearly: by how much from what
+    the others together say, and log of the chance, logs and effects counted."""
+
+    run: int
+    term: Term
+    judged: Judged
+    log_p: float
+
+
+def unlike_logs(pool: Pool, named: Sequence[Term]) -> tuple[UnlikeLog, ...]:
+    """All that are, fewer than half; none where starts are shared, for then starts may differ.
+
+    named: effects that the logs together show.
+    """
+    rows = np.arange(pool.count)
+    found: list[UnlikeLog] = []
+    if len(set(pool.starts.tolist())) < pool.count:
+        return ()
+    while True:
+        one = _most_unlike(pool.part(rows), named) if len(rows) >= FEWEST else None
+        if one is None:
+            return tuple(found)
+        if 2 * (len(found) + 1) >= pool.count:
+            return ()
+        found.append(replace(one, run=int(rows[one.run])))
+        rows = np.delete(rows, one.run)
+        if len(rows) < FEWEST and not _agree(pool.part(rows), named):
+            return ()
+
+
+def _agree(pool: Pool, named: Sequence[Term]) -> bool:
+    """Whether two logs that are left are alike."""
+    return _unlike(pool, named, 0) is None
+
+
+def _most_unlike(pool: Pool, named: Sequence[Term]) -> UnlikeLog | None:
+    every = [_unlike(pool, named, run) for run in range(pool.count)]
+    known = [one for one in every if one is not None]
+    return min(known, key=lambda one: one.log_p, default=None)
+
+
+def _unlike(pool: Pool, named: Sequence[Term], run: int) -> UnlikeLog | None:
+    """A log held against the others; None where noise would do."""
+    starts = np.zeros(pool.count, dtype=np.int64)
+    starts[run] = 1
+    parted = replace(pool, starts=starts)
+    charge = math.log(pool.count * max(len(pool.terms), 1))
+    tried = [_held(parted, named, term, run, charge) for term in pool.terms]
+    found = [one for one in tried if one is not None and one.log_p < math.log(RATE)]
+    least = min((one.log_p for one in found), default=0.0)
+    close = [one for one in found if one.log_p <= least + AS_GOOD_NATS]
+    return min(close, key=lambda one: commonness(one.term.label), default=None)
+
+
+def _held(
+    parted: Pool, named: Sequence[Term], term: Term, run: int, charge: float
+) -> UnlikeLog | None:
+    """One effect of one log; parted: that log as a start of its own."""
+    beside = [Scoped(one, "build") for one in named if one.label != term.label]
+    common = fitted(parted, [*beside, Scoped(term, "build")])
+    apart = fitted(parted, [*beside, Scoped(term, "start")])
+    gain = apart.gain - common.gain
+    if gain < LEAST_GAIN:
+        return None
+    others, own = (apart.judged(apart.place[-1][k]) for k in (0, 1))
+    temper = max(ratio(own), ratio(others))
+    seen = int(np.sum(np.diag(parted.normal[run][np.ix_(term.index, term.index)]) > 0.0))
+    log_p = log_p_of(2.0 * gain / temper, max(seen, 1)) + charge
+    return UnlikeLog(run, term, _difference(own, others), log_p)
+
+
+def _difference(own: Judged, others: Judged) -> Judged:
+    """A log's value less that of the others, their covariances added."""
+    return Judged(own.values - others.values, own.model + others.model, _both(own, others))
+
+
+def _both(own: Judged, others: Judged) -> tuple[tuple[Array, int], ...]:
+    pairs = zip(own.jackknives, others.jackknives, strict=False)
+    return tuple((a + b, min(m, n)) for (a, m), (b, n) in pairs)

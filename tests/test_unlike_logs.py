@@ -1,0 +1,119 @@
+"""Logs that are unlike the others, and runs of a store that are counted no more."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.oddities import _differing
+from syncline_design.campaign.pool import Pool, pool_of
+from syncline_design.campaign.store import read_store
+from syncline_design.campaign.unlike import unlike_logs
+from syncline_design.diagnosis.sufficient import Sufficient
+from tests.test_joint import UNITS, made, statistics
+from tests.watched_series import BOUND, car_spec, kept, run_of, series, told, watch
+from tests.watched_series import statistics as day_of
+
+
+def logs_of(values: list[np.ndarray], rng: np.random.Generator) -> tuple[Pool, list[np.ndarray]]:
+    """Logs with these values of all parameters, and what least squares makes of each alone."""
+    rows = [made(rng, one) for one in values]
+    alone = [np.linalg.lstsq(x, e, rcond=None)[0] for x, e in rows]
+    return pool_of([statistics(*one) for one in rows], list(range(len(rows)))), alone
+
+
+def test_the_one_log_that_differs_is_found_with_its_effect() -> None:
+    """Three of one value and one of the opposite sign; by how much, as least squares has it."""
+    same = np.array([0.6, 0.0, 0.0, 0.0, 0.0]) * UNITS
+    pool, alone = logs_of([same, same, -same, same], np.random.default_rng(3))
+    named = [t for t in pool.terms if t.label[0] == "latency"]
+    (one,) = unlike_logs(pool, named)
+    assert one.run == 2
+    assert one.term.label[0] == "latency"
+    apart = alone[2][0] - np.mean([alone[k][0] for k in (0, 1, 3)])
+    spread = float(one.judged.spread[0])
+    assert abs(float(one.judged.values[0]) - apart) < 1.5 * spread
+    assert one.log_p < -10.0
+
+
+def test_another_value_in_every_log_is_no_odd_one() -> None:
+    spread = [np.array([x, 0.0, 0.0, 0.0, 0.0]) * UNITS for x in (-1.5, -0.5, 0.6, 1.6)]
+    pool, _ = logs_of(spread, np.random.default_rng(5))
+    assert unlike_logs(pool, [t for t in pool.terms if t.label[0] == "latency"]) == ()
+
+
+@pytest.mark.parametrize("count", [3, 6])
+def test_alike_logs_are_said_to_differ_as_seldom_as_stated(count: int) -> None:
+    """1 % of sets of alike logs: of 300, more than 9 have a chance of 0.1 %."""
+    rng = np.random.default_rng(count)
+    same = np.array([0.5, 0.3, 0.0, -0.4, 0.2]) * UNITS
+    said = 0
+    for _ in range(300):
+        pool, _ = logs_of([same] * count, rng)
+        said += bool(unlike_logs(pool, pool.terms))
+    assert said <= 9
+
+
+def test_two_logs_or_shared_starts_have_no_odd_one() -> None:
+    same = np.array([0.6, 0.0, 0.0, 0.0, 0.0]) * UNITS
+    pool, _ = logs_of([same, -same], np.random.default_rng(3))
+    assert unlike_logs(pool, pool.terms) == ()
+
+
+def said_to_differ(runs: list[Sufficient]) -> bool:
+    """Whether any look at a series says that an effect has another value in every run."""
+    changes = Changes(pool_of(runs, list(range(len(runs)))))
+    looks = range(3, len(runs) + 1)
+    return any(list(_differing(changes, (), look, str)) for look in looks)
+
+
+def test_four_runs_that_scatter_by_chance_are_not_said_to_differ() -> None:
+    """What is freed for caution's sake, from three standard deviations of Q on, is not said yet:
+    of three degrees of freedom that is one in sixty by chance, of each of many effects."""
+    turns = np.array([1.0, -1.0, 1.0, -1.0])
+
+    def runs(size: float) -> list[Sufficient]:
+        rng = np.random.default_rng(2)
+        first = np.eye(5)[0]
+        return [day_of(rng, size * t * BOUND * first) for t in turns]
+
+    for size in np.arange(0.5, 8.0, 0.25):
+        if Changes(pool_of(runs(size), [0, 1, 2, 3])).differing(4):
+            break
+    assert not said_to_differ(runs(size))
+    assert said_to_differ(runs(4.0 * size))
+
+
+def test_a_run_that_is_left_out_is_counted_no_more_and_said(tmp_path: Path) -> None:
+    """A store with one wild run rings; left out it does not, the line is chained, and every later
+    look says so."""
+    spec = car_spec(tmp_path / "car.yaml")
+    found_in = series(4, 6, np.array([20.0, 0, 0, 0, 0]) * BOUND, 5)
+    runs = [run_of(one, k) for k, one in enumerate(found_in)]
+    store = kept(spec, tmp_path, runs)
+    assert told(spec, store, tmp_path, 1)["verdict"] == "alarm"
+    before = store.read_bytes()
+    missing = watch(store, "--leave-out", "6")
+    assert missing.exit_code == 2
+    assert "--reason" in missing.output
+    said = watch(store, "--leave-out", "6", "--reason", "another vehicle")
+    assert said.exit_code == 0
+    assert store.read_bytes().startswith(before)
+    found = told(spec, store, tmp_path, 0)
+    assert found["verdict"] == "unchanged"
+    assert any("run 6" in one and "another vehicle" in one for one in found["cautions"])
+    assert [one.get("left_out") for one in found["runs"]] == [None] * 5 + [True]
+    stored = read_store(store)
+    assert stored is not None
+    assert [one.number for one in stored.counted] == [1, 2, 3, 4, 5]
+    assert watch(store, "--leave-out", "6", "--reason", "again").exit_code == 2
+    assert watch(store, "--leave-out", "7", "--reason", "none").exit_code == 2
+    lines = store.read_text(encoding="ascii").splitlines()
+    at = next(k for k, one in enumerate(lines) if json.loads(one)["body"]["kind"] == "left_out")
+    forged = [*lines[:at], lines[at].replace("another vehicle", "a vehicle"), *lines[at + 1 :]]
+    store.write_text("\n".join(forged) + "\n", encoding="ascii")
+    assert watch(store, spec).exit_code == 2
