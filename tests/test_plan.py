@@ -116,9 +116,9 @@ def test_the_words_are_the_drive(run: PlanRun, pair: PlanRun) -> None:
         assert one.result.legs[0].turn_deg == 0.0
         assert not one.result.legs[0].words.startswith("Turn ")
         for k, told in enumerate(one.result.legs):
-            assert math.remainder(yaw[leg == k][-1] - yaw[leg == k][0], 90.0) == pytest.approx(
-                0.0, abs=2.0
-            )
+            if k + 1 < len(one.result.legs):  # what ends a drive may end at any heading
+                turned = yaw[leg == k][-1] - yaw[leg == k][0]
+                assert math.remainder(turned, 90.0) == pytest.approx(0.0, abs=2.0)
             if k == 0:
                 assert told.heading_deg == pytest.approx(yaw[0], abs=1e-6)
                 continue
@@ -171,7 +171,7 @@ def test_a_drive_is_laid_beside_targets_that_are_surveyed_already(tmp_path: Path
         world(found), (hidden("latency", "position", latency_s=0.0),), Noise()
     ).values()
     assert plan.after[-1].sigma["latency(position).latency_s"] == pytest.approx(bound, rel=0.05)
-    assert ">target P0<" in render_plan("kml", found)
+    assert all(f">target {name}<" in render_plan("kml", found) for name in used.values())
 
 
 @pytest.mark.parametrize(
@@ -411,12 +411,12 @@ def test_a_diagnosis_that_is_no_plain_file_is_refused(
 
 
 def test_too_few_minutes_end_with_the_least_that_is_enough(spec: Path) -> None:
-    done = call(spec, "--reach", REACH, "--minutes", 0.3, "-o", "json:-")
+    done = call(spec, "--reach", REACH, "--minutes", 0.1, "-o", "json:-")
     assert done.exit_code == 1
     data = json.loads(done.stdout)
     assert not data["reached"]
     least = data["least_minutes"]
-    assert least > 0.3
+    assert least > 0.1
     assert call(spec, "--reach", REACH, "--minutes", 1.01 * least, "-q").exit_code == 0
 
 

@@ -153,7 +153,7 @@ def test_more_time_makes_no_worse_drive_of_what_is_too_short(tmp_path: Path) -> 
     another, where a longer one that fits tells more.  With 26 s as much is told as with 21 s."""
     path = tmp_path / "copter.yaml"
     path.write_text(SHIPPED, encoding="utf-8")
-    spec, wanted = load(path), PlanWanted(reach_of("latency(position)=1 ms"))
+    spec, wanted = load(path), PlanWanted(reach_of("latency(position)=0.3 ms"))
     sigma = {}
     for seconds in (21.0, 25.8):
         request = PlanRequest(wanted, minutes=seconds / 60.0, line_plans=False)

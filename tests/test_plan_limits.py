@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 import syncline_design as sd
 from syncline_design.planning.drives import outcome
-from syncline_design.planning.legs import MOST_LEG_S, library, transition
+from syncline_design.planning.leg_library import library
+from syncline_design.planning.legs import MOST_LEG_S, transition
 from syncline_design.planning.path import STEP_S, CourseCommands, joined, travelled, unasked
 from syncline_design.planning.run import plan as planned
 from syncline_design.planning.setup import PlanRequest, Setup

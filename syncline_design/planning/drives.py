@@ -30,7 +30,8 @@ from syncline_design.planning.information import (
     unknowns,
     with_shift,
 )
-from syncline_design.planning.legs import QUARTER_RAD, Leg, library, transition
+from syncline_design.planning.leg_library import library
+from syncline_design.planning.legs import QUARTER_RAD, Leg, transition
 from syncline_design.planning.path import STEP_S, CourseCommands, PathStates, joined, travelled
 from syncline_design.planning.placing import LegTold, Room, Swept, arranged
 from syncline_design.planning.planned_log import (
@@ -73,13 +74,24 @@ class World:
     def computed_hz(self) -> float:
         return min(self.rate_hz, self.most_hz)
 
-    def coarse(self, duration_s: float) -> World:
-        """The same for a drive of so much time, with at most `MOST_ROWS` rows.
+    def coarse(self, duration_s: float, rows: int = MOST_ROWS) -> World:
+        """The same for a drive of so much time, with at most so many rows.
 
         Its unknowns stay: which ones a log shows hangs on its rows a second.
         """
-        most_hz = min(self.most_hz, MOST_ROWS / max(duration_s, 1.0))
+        most_hz = min(self.most_hz, rows / max(duration_s, 1.0))
         return replace(self, most_hz=most_hz, same_unknowns=self.every)
+
+    @property
+    def in_waves(self) -> bool:
+        """Whether waves move a vehicle unasked, and tell effects apart."""
+        return any(one.motion == "surface" and not one.calm for one in self.vehicles)
+
+    @cached_property
+    def calm(self) -> World:
+        """The same without waves."""
+        still = tuple(replace(one, calm=True) for one in self.vehicles)
+        return replace(self, vehicles=still, same_unknowns=self.every)
 
     def driven(self, courses: Sequence[CourseCommands]) -> Drive:
         """A drive of courses, one a stage, all of one length."""
@@ -180,10 +192,14 @@ class World:
         return found[:count, :count], cross + cross.T, twice
 
     def _summed(self, leg: Leg, parts: Sequence[tuple[Array, Array, Array]]) -> LegTold:
+        now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
+        return self.placeable(leg, now, once, twice)
+
+    def placeable(self, leg: Leg, now: Array, once: Array, twice: Array) -> LegTold:
+        """A leg with what it tells and how it is placed."""
         vehicle = self.vehicles[leg.stage]
         path = travelled(vehicle, leg.course)
         turns_s = (transition(vehicle, 0.0).duration_s, transition(vehicle, math.pi).duration_s)
-        now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
         return LegTold(
             leg,
             now,
@@ -286,6 +302,7 @@ class WholeDrive:
     after: tuple[Array, ...]
     slopes: Array
     noise: tuple[Structure, NoiseLevel]
+    sequence: tuple[LegTold, ...]
 
 
 def whole_information(world: World, sequence: Sequence[LegTold]) -> Array:
@@ -308,4 +325,6 @@ def outcome(world: World, sequence: Sequence[LegTold]) -> WholeDrive:
         in_force().check()
         rows = slice(0, int(np.searchsorted(view.log.time_s, one.to_s)))
         after.append(fisher(structure.rows(rows), level, slopes[rows]))
-    return WholeDrive(stretches, driven, view, tuple(after), slopes, (structure, level))
+    return WholeDrive(
+        stretches, driven, view, tuple(after), slopes, (structure, level), tuple(sequence)
+    )

@@ -17,6 +17,7 @@ from typing import Final
 
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.planning.cutting import SAVES, Cutting
 from syncline_design.planning.drives import whole_information
 from syncline_design.planning.effort import Effort
 from syncline_design.planning.placing import LegTold, lasting_s
@@ -27,10 +28,10 @@ AIM: Final = 0.993  # of what is asked that a drive is to reach
 CLOSE: Final = 0.985  # of what is asked: from there on a drive tells hardly more
 TRIED: Final = 5  # margins
 MOST_JUDGED: Final = 24  # drives that are judged whole
+FEW_ROWS: Final = 300  # of a leg that is only tried
 ALIKE: Final = 0.003  # by which two margins differ that are as good as one
 BY_TURNS: Final = 0.6  # of what one leg falls short by alone that the turns beside it may make up
 MOST_PASSED_BY: Final = 24  # drives passed by that are judged whole
-SAVES: Final = 0.95  # of a drive's time: one that takes more saves nothing that matters
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +62,25 @@ def shortest(setup: Setup, search: LegSearch, most_s: float) -> Shortest:
         return Shortest(search.grown([], most_s), search.margin, judged=False)
     enough = whole.first_enough(sorted(found, key=lasting_s))
     if enough is not None:
-        enough = _passed_by(search, whole, enough)
+        enough = _cut(search, whole, _passed_by(search, whole, enough))
     return Shortest(enough or found[0], tried.passed or search.margin, enough is not None)
+
+
+def _cut(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTold]:
+    """The drive, or a shorter one of one swing of speed that is cut to what is asked."""
+
+    def is_enough(told: LegTold) -> bool:
+        if search.deadline.is_over or search.effort.is_half_over or not search.fits([told]):
+            return False
+        return whole.roughly(told) <= AIM
+
+    stages = tuple(sorted({told.leg.stage for told in search.legs}))
+    cutting = Cutting(whole.setup.world, stages, is_enough)
+    found = cutting.shorter(lasting_s(enough))
+    if found is None:
+        return enough
+    cut = list(whole.setup.world.looked_at([found.leg]))
+    return cut if whole.worst(cut) <= 1.0 else enough
 
 
 def _passed_by(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTold]:
@@ -111,7 +129,7 @@ class _Whole:
 
     setup: Setup
     effort: Effort
-    known: dict[tuple[int, ...], float] = field(default_factory=dict)
+    known: dict[tuple[int, ...], tuple[float, list[LegTold]]] = field(default_factory=dict)
 
     def worst(self, legs: list[LegTold]) -> float:
         """1 and below where it is enough."""
@@ -121,8 +139,16 @@ class _Whole:
             lasts_s = lasting_s(legs)
             world = self.setup.world.coarse(lasts_s)
             self.effort.look_at(world.computed_hz * lasts_s)
-            self.known[key] = self.setup.judge.worst(whole_information(world, legs))
-        return self.known[key]
+            worst = self.setup.judge.worst(whole_information(world, legs))
+            self.known[key] = worst, legs  # whose places in memory no others may take
+        return self.known[key][0]
+
+    def roughly(self, told: LegTold) -> float:
+        """The same of one leg from a few of its rows, each of which counts for several."""
+        in_force().check()
+        world = self.setup.world.coarse(lasting_s([told]), FEW_ROWS)
+        self.effort.look_at(world.computed_hz * lasting_s([told]))
+        return self.setup.judge.worst(whole_information(world, [told]))
 
     def first_enough(self, drives: Sequence[list[LegTold]]) -> list[LegTold] | None:
         """The first that is enough, of as many as may be judged."""

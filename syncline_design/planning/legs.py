@@ -63,7 +63,7 @@ def ramps(vehicle: Vehicle, steps: list[tuple[float, float]], join_mps: float) -
     return np.concatenate(parts)
 
 
-def _course(ahead: Array, right: Array | None = None, down: Array | None = None,
+def course(ahead: Array, right: Array | None = None, down: Array | None = None,
             turn: Array | None = None) -> CourseCommands:  # fmt: skip
     zero = np.zeros_like(ahead)
     return CourseCommands(ahead, *(zero if v is None else v for v in (right, down, turn)))
@@ -79,7 +79,7 @@ def turning(vehicle: Vehicle, speed: float, angles: list[float]) -> CourseComman
     for angle, count in zip(angles, counts, strict=True):
         turn[at : at + count] = angle / (count * STEP_S)
         at += count
-    return _course(ahead, turn=turn)
+    return course(ahead, turn=turn)
 
 
 def _room_s(vehicle: Vehicle) -> float:
@@ -95,7 +95,7 @@ def transition(vehicle: Vehicle, angle_rad: float) -> CourseCommands:
     rest = round(2.0 * vehicle.rounding_s / STEP_S)
     turn = np.concatenate([np.zeros(rest), np.full(count, angle_rad / max(count * STEP_S, STEP_S)),
                            np.zeros(rest)])  # fmt: skip
-    return _course(np.full(turn.shape, speed), turn=turn)
+    return course(np.full(turn.shape, speed), turn=turn)
 
 
 def _wave(duration_s: float, cycles: int) -> Array:
@@ -106,19 +106,21 @@ def _wave(duration_s: float, cycles: int) -> Array:
     return np.asarray(fade * np.sin(FULL_RAD * cycles * time_s / duration_s))
 
 
-def _mps(speed: float) -> str:
+def speed_words(speed: float) -> str:
     return f"{to_digits(speed, 3)} m/s"
 
 
 def _straight(v: Vehicle) -> tuple[str, CourseCommands]:
     ahead = ramps(v, [(v.fast_mps, LINE_S)], v.join_mps)
-    return f"straight ahead at {_mps(v.fast_mps)} for {to_places(LINE_S, 0)} s", _course(ahead)
+    return f"straight ahead at {speed_words(v.fast_mps)} for {to_places(LINE_S, 0)} s", course(
+        ahead
+    )
 
 
 def _slow(v: Vehicle) -> tuple[str, CourseCommands]:
     speed = max(v.slowest_mps, 0.3 * v.v_max_mps)
     ahead = ramps(v, [(speed, LINE_S)], v.join_mps)
-    return f"straight ahead at {_mps(speed)} for {to_places(LINE_S, 0)} s", _course(ahead)
+    return f"straight ahead at {speed_words(speed)} for {to_places(LINE_S, 0)} s", course(ahead)
 
 
 def _reciprocal(v: Vehicle) -> tuple[str, CourseCommands]:
@@ -126,8 +128,8 @@ def _reciprocal(v: Vehicle) -> tuple[str, CourseCommands]:
     turn = transition(v, math.pi)
     ahead = np.concatenate([line, turn.ahead, line])
     zero = np.zeros_like(line)
-    words = f"a line at {_mps(v.fast_mps)}, turn about, the same line back"
-    return words, _course(ahead, turn=np.concatenate([zero, turn.turn, zero]))
+    words = f"a line at {speed_words(v.fast_mps)}, turn about, the same line back"
+    return words, course(ahead, turn=np.concatenate([zero, turn.turn, zero]))
 
 
 def _stop_and_go(v: Vehicle) -> tuple[str, CourseCommands] | None:
@@ -136,8 +138,10 @@ def _stop_and_go(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if reach <= least * 1.1:
         return None
     ahead = ramps(v, [(reach, 1.0), (least, 1.0)] * 3, v.join_mps)
-    slow = "a stop" if least == 0.0 else _mps(least)
-    return f"three times from {slow} up to {_mps(reach)} and back, straight ahead", _course(ahead)
+    slow = "a stop" if least == 0.0 else speed_words(least)
+    return f"three times from {slow} up to {speed_words(reach)} and back, straight ahead", course(
+        ahead
+    )
 
 
 def _slow_and_fast(v: Vehicle) -> tuple[str, CourseCommands] | None:
@@ -148,8 +152,8 @@ def _slow_and_fast(v: Vehicle) -> tuple[str, CourseCommands] | None:
     turn = transition(v, math.pi)
     zeros = [np.zeros_like(one) for one in line]
     ahead = np.concatenate([line[0], turn.ahead, line[1]])
-    words = f"a line at {_mps(low)}, turn about, the same line at {_mps(v.fast_mps)}"
-    return words, _course(ahead, turn=np.concatenate([zeros[0], turn.turn, zeros[1]]))
+    words = f"a line at {speed_words(low)}, turn about, the same line at {speed_words(v.fast_mps)}"
+    return words, course(ahead, turn=np.concatenate([zeros[0], turn.turn, zeros[1]]))
 
 
 def _speeds(v: Vehicle, hold_s: float) -> tuple[str, CourseCommands] | None:
@@ -158,16 +162,18 @@ def _speeds(v: Vehicle, hold_s: float) -> tuple[str, CourseCommands] | None:
     if low > 0.9 * v.fast_mps:
         return None
     words = (
-        f"one line, {to_places(hold_s, 0)} s at {_mps(low)} and {to_places(hold_s, 0)} s "
-        f"at {_mps(v.fast_mps)}"
+        f"one line, {to_places(hold_s, 0)} s at {speed_words(low)} and {to_places(hold_s, 0)} s "
+        f"at {speed_words(v.fast_mps)}"
     )
-    return words, _course(ramps(v, [(low, hold_s), (v.fast_mps, hold_s)], v.join_mps))
+    return words, course(ramps(v, [(low, hold_s), (v.fast_mps, hold_s)], v.join_mps))
 
 
 def _circle(v: Vehicle, sign: float) -> tuple[str, CourseCommands]:
     speed = _turning_speed(v)
     side = "right" if sign > 0 else "left"
-    return f"a full circle to the {side} at {_mps(speed)}", turning(v, speed, [sign * FULL_RAD])
+    return f"a full circle to the {side} at {speed_words(speed)}", turning(
+        v, speed, [sign * FULL_RAD]
+    )
 
 
 def _swinging_circle(v: Vehicle) -> tuple[str, CourseCommands] | None:
@@ -190,9 +196,9 @@ def _swinging_circle(v: Vehicle) -> tuple[str, CourseCommands] | None:
     slow, fast = _between_peaks(rounded(v, ahead))
     words = (
         f"on a circle to the right of {to_digits(radius, 2)} m radius, three times up to "
-        f"{_mps(fast)}, down to {_mps(slow)} in between, {90 * quarters} deg in all"
+        f"{speed_words(fast)}, down to {speed_words(slow)} in between, {90 * quarters} deg in all"
     )
-    return words, _course(ahead, turn=ahead / radius)
+    return words, course(ahead, turn=ahead / radius)
 
 
 def _between_peaks(speed: Array) -> tuple[float, float]:
@@ -215,7 +221,7 @@ LEAST_SLALOM_DEG = 2.0  # swings of the heading below it are a straight line to 
 
 def _eight(v: Vehicle) -> tuple[str, CourseCommands]:
     speed = _turning_speed(v)
-    words = f"a figure eight at {_mps(speed)}, first to the right"
+    words = f"a figure eight at {speed_words(speed)}, first to the right"
     return words, turning(v, speed, [FULL_RAD, -FULL_RAD])
 
 
@@ -224,7 +230,7 @@ def _reverse(v: Vehicle) -> tuple[str, CourseCommands] | None:
         return None
     speed = min(0.4 * v.v_max_mps, 0.6 * v.acceleration_mps2 * 4.0)
     ahead = ramps(v, [(speed, 2.0), (-speed, 2.0)] * 2, v.join_mps)
-    return f"twice ahead and back astern at {_mps(speed)}, the heading kept", _course(ahead)
+    return f"twice ahead and back astern at {speed_words(speed)}, the heading kept", course(ahead)
 
 
 def _spin(v: Vehicle) -> tuple[str, CourseCommands] | None:
@@ -249,7 +255,7 @@ def _sway(v: Vehicle, sideways: bool) -> tuple[str, CourseCommands] | None:
     axis, name = ("roll", "sideways") if sideways else ("pitch", "to and fro")
     words = f"{axis} sweeps: sway {name} every {to_places(SWEEP_S / cycles, 0)} s, leaning to " \
             f"{to_digits(leans, 2)} deg"  # fmt: skip
-    return words, _course(zero, right=swing) if sideways else _course(swing)
+    return words, course(zero, right=swing) if sideways else course(swing)
 
 
 def _rock(v: Vehicle) -> tuple[str, CourseCommands] | None:
@@ -264,17 +270,18 @@ def _rock(v: Vehicle) -> tuple[str, CourseCommands] | None:
     turn[at : at + len(swing)] = swing
     each = f"{cycles} times, {to_places(period, 0)} s each"
     if v.motion == "fixed_wing":
-        return f"roll sweeps: rock the wings at {_mps(speed)} to either side, {each}", _course(
-            ahead, turn=turn
+        return (
+            f"roll sweeps: rock the wings at {speed_words(speed)} to either side, {each}",
+            course(ahead, turn=turn),
         )
     heading = math.degrees(float(np.ptp(np.cumsum(rounded(v, turn)) * STEP_S)))
     if heading < LEAST_SLALOM_DEG:
         return None
     words = (
-        f"a slalom at {_mps(speed)}: the heading swings through {to_digits(heading, 2)} deg, first "
-        f"to the right, {each}"
+        f"a slalom at {speed_words(speed)}: the heading swings through {to_digits(heading, 2)} "
+        f"deg, first to the right, {each}"
     )
-    return words, _course(ahead, turn=turn)
+    return words, course(ahead, turn=turn)
 
 
 def _heights(v: Vehicle) -> tuple[str, CourseCommands] | None:
@@ -285,7 +292,7 @@ def _heights(v: Vehicle) -> tuple[str, CourseCommands] | None:
     down = rate * _wave(len(ahead) * STEP_S, 2)[: len(ahead)]
     down = np.pad(down, (0, len(ahead) - len(down)))
     step = rate * len(ahead) * STEP_S / 2 / math.pi
-    return f"height steps: {to_digits(step, 2)} m down and up again, twice, flying on", _course(
+    return f"height steps: {to_digits(step, 2)} m down and up again, twice, flying on", course(
         ahead, down=down
     )
 
@@ -312,8 +319,8 @@ MAKERS: dict[str, Maker] = {
 }
 
 
-def library(vehicle: Vehicle, stage: int) -> tuple[Leg, ...]:
-    """Every leg that the vehicle can do, in a time that is worth it, within its area."""
+def usual_legs(vehicle: Vehicle, stage: int) -> tuple[Leg, ...]:
+    """The legs of the field, and of flight tests, that the vehicle can do in a time worth it."""
     return tuple(_made(vehicle, stage))
 
 

@@ -133,7 +133,7 @@ def _tilts(
         case "fixed_wing":
             return np.arctan(sideways / GRAVITY_MPS2), slope, zero
         case "surface":
-            return _sea(vehicle, time_s)
+            return (zero, zero, zero) if vehicle.calm else _sea(vehicle, time_s)
         case "ground":
             roll, pitch = _uneven(time_s)
             return roll - 0.01 * sideways, pitch + 0.01 * forward, zero

@@ -110,6 +110,37 @@ class Flown(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Lacking(Record):
+    """What is furthest from what is asked, SI.
+
+    what: a parameter, of which value is the sigma, or a pair, of which it is the noncentrality;
+    beside: the other effect, with which left free that is the sigma.  asked: what value is held to.
+    """
+
+    what: str
+    beside: str | None
+    value: Unbounded
+    asked: float
+
+
+@dataclass(frozen=True, slots=True)
+class DearLeg(Record):
+    """A leg that takes more than half of a drive's time, and what fails without it."""
+
+    leg: str
+    lasts_s: float
+    without: Lacking
+
+
+@dataclass(frozen=True, slots=True)
+class CalmWater(Record):
+    """A drive in calm water: whether it is enough there, and what it lacks where it is not."""
+
+    reached: bool
+    lacking: Lacking | None
+
+
+@dataclass(frozen=True, slots=True)
 class PlanProvenance(Record):
     """What the plan depends on."""
 
@@ -127,8 +158,11 @@ class Plan(Record):
     least_minutes: the least that does so, null where no drive does.  tolerance: what is asked, SI.
     inseparable: pairs that no drive of this platform tells apart.  confused: effects any of which,
     left free, would widen what is asked too far, though another drive tells them apart; none where
-    it is reached.  unseen: what the drive says next to nothing of.  priors: standard deviations
-    before the drive, SI.  assumed: figures of the platform that the spec does not state.
+    it is reached.  unseen: effects, or those of their parameters, whose sigma with what is asked
+    free beside stays above the tolerance where one is asked, else above 0.7 of its prior.  priors:
+    standard deviations before the drive, what is plausible, SI.  dear: legs that take more than
+    half of the time.  calm: of a vehicle in waves, whether it is enough without them.  assumed:
+    figures of the platform that the spec does not state.
     surveyed: whether the targets were there already, and the drive is laid beside them.  sized:
     whether pairs are judged at a size that is known, beyond first order.  cautions: where what the
     plan was given may not be of this system.  alike: of the inseparable ones those that make the
@@ -162,6 +196,8 @@ class Plan(Record):
     sized: bool | None = optional()
     cautions: tuple[str, ...] | None = optional()
     alike: tuple[str, ...] | None = optional()
+    dear: tuple[DearLeg, ...] | None = optional()
+    calm: CalmWater | None = optional()
 
     @property
     def exit_code(self) -> int:

@@ -33,7 +33,26 @@ def plan(case: Case, request: PlanRequest | None = None) -> PlanRun:
     minutes is a result.
     """
     with one_thread():
-        return _Planning(Setup.begun(case, request or PlanRequest())).run()
+        setup = Setup.begun(case, request or PlanRequest())
+        return _enough_in_calm_water(setup) or _Planning(setup).run()
+
+
+def _enough_in_calm_water(setup: Setup) -> PlanRun | None:
+    """The drive of a ship that is enough with waves and without, in the minutes; None where none
+    was found, or where nothing is looked at twice, since the effort is counted."""
+    if not setup.world.in_waves or setup.request.effort is not None:
+        return None
+    calm = setup.in_calm_water
+    try:
+        legs = _Planning(calm).enough_within()
+    except NoVerdict:
+        return None
+    if legs is None:
+        return None
+    found = outcome(setup.world, setup.world.looked_at([told.leg for told in legs]))
+    if not setup.reached(found):
+        return None
+    return Telling(setup).whole(found, duration_s(found), SECONDS * setup.request.minutes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +61,26 @@ class _Planning:
 
     setup: Setup
 
-    def run(self) -> PlanRun:
+    def enough_within(self) -> list[LegTold] | None:
+        """The shortest drive that is enough; None where it takes more than the minutes."""
+        search = self._search()
         most_s = SECONDS * self.setup.request.minutes
+        found = shortest(self.setup, search, most_s)
+        within = found.judged and steered_s(self.setup.world, found.legs) <= most_s
+        return found.legs if within else None
+
+    def _search(self) -> LegSearch:
+        """A search within a part of the command's time."""
         in_force().doing("searching for legs")
         limit = in_force().left_s()
         deadline = in_force().inner(None if limit is None else SEARCH_SHARE * limit)
         effort = Effort() if self.setup.request.effort is None else self.setup.request.effort
         effort.begun += self.setup.rows / ROWS_OF_A_DRIVE
-        search = LegSearch(self.setup.told, self.setup.judge, deadline, self._area(), effort)
+        return LegSearch(self.setup.told, self.setup.judge, deadline, self._area(), effort)
+
+    def run(self) -> PlanRun:
+        most_s = SECONDS * self.setup.request.minutes
+        search = self._search()
         whole = shortest(self.setup, search, max(LONGEST_S, most_s))
         search = search.at(whole.margin)
         reaches = whole.judged or search.reaches(whole.legs)

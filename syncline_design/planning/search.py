@@ -103,6 +103,7 @@ def others_of(every: Sequence[Unknown], goal: Goal, library: Array, prior: Array
     covariance, _ = covariance_of(library[np.ix_(wanted, wanted)], VAGUE * prior[wanted])
     inflation = found.widened(library, wanted, VAGUE * prior) / np.sqrt(np.diag(covariance))
     limit = np.where(inflation < INSEPARABLE, np.maximum(WIDENED, 1.5 * inflation), np.inf)
+    limit[:, goal.only_rival] = np.inf
     kept = np.any(np.isfinite(limit), axis=1)
     return Others(index[kept], limit[kept])
 
@@ -153,6 +154,16 @@ class PlanJudge:
         if not len(self.others.index):
             return np.zeros(0)
         return np.asarray(np.max(self._shares(information), axis=0))
+
+    def taken(self, information: Array, k: int) -> tuple[int, float, float]:
+        """The other effect that takes most of what is wanted at place k: its own first place, the
+        sigma with it free, and what that may be."""
+        index = list(self.goal.wanted)
+        vague = VAGUE * self.prior
+        row = int(np.argmax(self._shares(information)[:, k]))
+        widened = float(self.others.widened(information, index, vague)[row, k])
+        share = float(self._shares(information)[row, k])
+        return int(self.others.index[row, 0]), widened, widened / share
 
     def confusing(self, information: Array) -> list[int]:
         """First places of the effects that widen something more than they may."""

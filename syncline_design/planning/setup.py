@@ -108,6 +108,12 @@ class Setup:
         return cls(case, request, world, goal, PlanJudge(goal, prior, others), told, apart, alike)
 
     @property
+    def in_calm_water(self) -> Setup:
+        """The same question to the same vehicles without waves."""
+        world = self.world.calm
+        return replace(self, world=world, told=world.looked_at([t.leg for t in self.told]))
+
+    @property
     def system(self) -> System:
         """The system, pinned."""
         return self.world.system

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -28,6 +28,7 @@ from syncline_design.planning.information import (
     fisher,
     sigmas,
 )
+from syncline_design.planning.lacking import dear_legs, in_calm_water
 from syncline_design.planning.path import PathStates, unasked
 from syncline_design.planning.planned_log import Drive
 from syncline_design.planning.result import (
@@ -54,7 +55,7 @@ from syncline_design.planning.wanted import (
     text_of,
 )
 
-UNSEEN: Final = 0.7  # of the prior: what a drive leaves that uncertain, it does not show
+UNSEEN: Final = 0.7  # of what is plausible: a parameter left that uncertain is not shown
 MOST_BLIND: Final = 0.15  # of a drive without a target in sight, before that is said
 ROW_S: Final = 0.1  # between rows of the path that is written
 MOST_PATH_ROWS: Final = 200_000
@@ -131,6 +132,8 @@ class Telling:
             ),
             flown=self._flown(),
             sized=bool(self.setup.world.beyond) or None,
+            dear=tuple(dear_legs(self.setup, found)) or None if reached else None,
+            calm=in_calm_water(self.setup, found) if reached else None,
             cautions=(
                 *self._cautions(),
                 *self._beyond_areas(found.driven),
@@ -210,19 +213,38 @@ class Telling:
         return tuple(text_of(self.setup.system, self.setup.world.every[k]) for k in places)
 
     def _unseen(self, information: Array) -> tuple[str, ...]:
-        """Effects whose parameters stay as uncertain as before, whole or some of them."""
-        every = sigmas(information, range(len(self.setup.keys)), self.setup.judge.prior)
-        hidden: dict[str, list[str]] = {}
-        whole: dict[str, int] = {}
-        for one, sigma in zip(self.setup.world.every, every, strict=True):
-            text = text_of(self.setup.system, one)
-            whole[text] = whole.get(text, 0) + 1
-            if sigma > UNSEEN * one.prior:
-                hidden.setdefault(text, []).append(one.parameter.name)
-        return tuple(
-            text if len(names) == whole[text] else f"{text}: {', '.join(names)}"
-            for text, names in hidden.items()
-        )
+        """Effects of whose parameters the drive tells too little, whole or some of them.
+
+        Each effect with what is asked free beside it, not with all effects at once, of which some
+        are one: its sigma against the tolerance where one is asked, else against what is plausible.
+        """
+        groups: dict[str, list[int]] = {}
+        for k, one in enumerate(self.setup.world.every):
+            groups.setdefault(text_of(self.setup.system, one), []).append(k)
+        found = []
+        for text, places in groups.items():
+            hidden = self._hidden(information, places)
+            if hidden:
+                names = [self.setup.world.every[k].parameter.name for k in hidden]
+                found.append(text if len(hidden) == len(places) else f"{text}: {', '.join(names)}")
+        return tuple(found)
+
+    def _hidden(self, information: Array, places: Sequence[int]) -> list[int]:
+        """Of one effect's parameters those of which the drive tells too little."""
+        goal, prior = self.setup.goal, self.setup.judge.prior
+        asked = dict(zip(goal.wanted, goal.tolerance, strict=True))
+        own = dict(zip(goal.wanted, sigmas(information, list(goal.wanted)), strict=True))
+        index = sorted({*places, *goal.wanted})
+        beside = dict(zip(index, sigmas(information, index, prior[index]), strict=True))
+        return [
+            k
+            for k in places
+            if (
+                own[k] > asked[k]
+                if math.isfinite(asked.get(k, math.inf))
+                else beside[k] > UNSEEN * prior[k]
+            )
+        ]
 
     def _legs(self, found: WholeDrive) -> tuple[PlannedLeg, ...]:
         return tuple(

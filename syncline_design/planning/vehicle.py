@@ -61,7 +61,7 @@ class Vehicle:
 
     area_m: north and east extent within which a drive has to stay; None: anywhere.
     depth_m: how far below the reference point targets lie on average; 0: around it.
-    assumed: figures that the spec does not state, in words.
+    assumed: figures that the spec does not state, in words.  calm: whether there are no waves.
     """
 
     stage: str
@@ -76,6 +76,7 @@ class Vehicle:
     depth_m: float
     area_m: tuple[float, float] | None = None
     assumed: tuple[str, ...] = ()
+    calm: bool = False
 
     @property
     def usual(self) -> Usual:

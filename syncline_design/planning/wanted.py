@@ -13,6 +13,7 @@ from dataclasses import field
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
@@ -209,6 +210,17 @@ class Goal:
     wanted: tuple[int, ...]
     tolerance: Array
     pairs: tuple[PairGoal, ...]
+
+    @property
+    def only_rival(self) -> NDArray[np.bool_]:
+        """Which of what is wanted is only what an effect of known size is to be told from.
+
+        What else such a rival may be does not matter: whatever takes its place as well, it is not
+        the effect.
+        """
+        rivals = set(self.pairs[0].second) if self.pairs and self.pairs[0].known else set()
+        own = {*self.pairs[0].first} if self.pairs else set()
+        return np.array([k in rivals - own for k in self.wanted]) & ~np.isfinite(self.tolerance)
 
 
 def keys_of(system: System, every: Sequence[Unknown]) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from syncline_design.model.figure_text import format_duration, format_like, form
 from syncline_design.model.quantity import si_name, split_suffix, suffix_unit
 from syncline_design.model.unit_table import Dimension
 from syncline_design.planning.path import PathStates
-from syncline_design.planning.result import Flown, Plan, Separated
+from syncline_design.planning.result import Flown, Lacking, Plan, Separated
 from syncline_design.planning.run import LONGEST_S
 from syncline_design.planning.telling import PlanRun
 from syncline_design.report import charts_plan as drawings
@@ -79,6 +79,8 @@ def _outcome(found: Plan) -> Outcome:
     length = _minutes(found.duration_s / 60.0)
     if found.reached:
         rest = ", but for what no drive tells" if found.inseparable else ""
+        if found.calm is not None and not found.calm.reached:
+            rest = f"{rest}, in waves only"
         return Outcome("good", "\u2713", f"Reached by {legs} in {length}{rest}")
     if found.least_minutes is None and _larger(found) is not None:
         return Outcome("bad", "\u2717", "Told apart only where it is larger")
@@ -122,7 +124,38 @@ def _sentences(found: Plan) -> Iterator[Inline]:
         )
     if found.confused:
         yield _would_take(found.confused)
+    if found.calm is not None:
+        yield from _in_calm_water(found)
+    for one in found.dear or ():
+        lasts, whole = (_minutes(s / 60.0) for s in (one.lasts_s, found.duration_s))
+        yield f"Leg {one.leg} takes {lasts} of the {whole}. Without it {_lacking(one.without)}."
     yield from found.cautions or ()
+
+
+def _in_calm_water(found: Plan) -> Iterator[Inline]:
+    """Whether a ship's drive rests on the waves."""
+    assert found.calm is not None
+    if found.calm.lacking is None:
+        yield "It is enough in calm water as well as in the waves that are taken."
+    else:
+        yield (
+            "Only the waves make it enough, and no drive was found that is in calm water, too: "
+            f"there {_lacking(found.calm.lacking)}."
+        )
+
+
+def _lacking(one: Lacking) -> str:
+    """What fails, with its figure."""
+    if " and " in one.what:
+        value, asked = numbers.number(one.value, 3), numbers.number(one.asked, 3)
+        return f"{one.what} are not told apart: noncentrality {value} of {asked} asked"
+    value, asked = figure(one.what, one.value), figure(one.what, one.asked)
+    if one.beside is None:
+        return f"{parameter(one.what)} stays at {value}, where {asked} is asked"
+    return (
+        f"{effect_words(one.beside)}, left free, would take {parameter(one.what)}: {value}, where "
+        f"{asked} is the most that it may make of it"
+    )
 
 
 def _steps(found: Plan) -> str:
@@ -356,7 +389,10 @@ def _open(found: Plan) -> list[Node]:
             )
         )
     if found.unseen:
-        words = "With every effect free, this drive leaves these as uncertain as before: "
+        words = (
+            "With what is asked free beside them, this drive leaves these above what is asked of "
+            "them, or else about as uncertain as is plausible: "
+        )
         nodes.append(Text(words + "; ".join(map(effect_words, found.unseen)) + "."))
     return nodes
 
