@@ -12,6 +12,7 @@ import pytest
 
 from syncline_design.auditing.result import StampFault, StreamAudit
 from syncline_design.auditing.run import audit
+from tests.stamped_streams import of
 
 BEGAN = 1_755_000_000
 
@@ -253,3 +254,14 @@ def test_a_drift_beside_rare_long_delays_stays_one(tmp_path: Path) -> None:
     row = said(tmp_path, t * (1.0 + 30e-6), receive)
     assert set(found(row)) == {"drift"}
     assert found(row)["drift"].parameters["ppm"] == pytest.approx(30.0, abs=2.0)
+
+
+@pytest.mark.parametrize("tick_s", [0.01, 0.02])
+def test_no_drift_is_promised_that_a_beat_with_a_hosts_ticks_would_hide(tick_s: float) -> None:
+    """A host that looks at its tick: what is slow and less than 1.2 ticks is never named."""
+    rng = np.random.default_rng([101, round(1e3 * tick_s)])
+    at = np.arange(0.0, 120.0, 1.0 / 60.3)
+    came = at + 2e-4 + rng.gamma(2.0, 1e-4, at.size)
+    found = of(at, tick_s * np.ceil(came / tick_s) + 1e-5 * rng.random(at.size))
+    assert found.smallest.drift_ppm is not None
+    assert found.smallest.drift_ppm >= 1.19e6 * tick_s / 120.0

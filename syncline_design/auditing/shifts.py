@@ -28,6 +28,7 @@ from syncline_design.auditing.witness import Side
 from syncline_design.machine.quick_dataclass import dataclass
 
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
+_BEAT: Final = 1.2  # ticks
 _REST: Final = 0.025  # of a jump: how well its size is known at once
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
 _OTHER_TICKS: Final = 3  # receipts that show a tick
@@ -59,6 +60,7 @@ class Shifts:
     blocks: Blocks | None
     breathing_s: float = 0.0  # how far receipts move to and fro while stamps keep their rhythm
     seen: tuple[Shape, ...] = ()  # in the levels, whosever they are
+    beat_s: float = 0.0  # what is slow and smaller may be a beat with a host's ticks
 
 
 def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
@@ -133,9 +135,9 @@ def _slow_shifts(
     seen = tuple(placed)
     judged = [_judged(pace, shape, time_s, blocks) for shape in placed]
     rest = late - course(tuple(shape for shape, _ in judged), time_s)
-    tick = _ticks_of(series, rest) if judged else 0.0
+    beat_s = _BEAT * _ticks_of(series, rest)
     # what is slow may be a beat between sensor and ticks
-    judged = [(s, side) for s, side in judged if side == "stamp" or abs(s.size_s) > 1.2 * tick]
+    judged = [(s, side) for s, side in judged if side == "stamp" or abs(s.size_s) > beat_s]
     found, sides = tuple(shape for shape, _ in judged), [side for _, side in judged]
     found = polished(found, [side == "stamp" for side in sides], blocks)
     count = witness.witness_of(series, pace, blocks)
@@ -163,7 +165,7 @@ def _slow_shifts(
         for s, side, seen in zip(found, sides, sharp, strict=True) if seen or side == "stamp"
     )  # fmt: skip
     breathing = float(np.ptp(course(left, blocks.time_s))) if left else 0.0
-    return Shifts(replace(series, stamp=whole), faults, shifts, blocks, breathing, seen)
+    return Shifts(replace(series, stamp=whole), faults, shifts, blocks, breathing, seen, beat_s)
 
 
 def _own(

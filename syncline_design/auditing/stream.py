@@ -380,7 +380,7 @@ def _summed(
     faults = tuple(found)
     return Examined(
         stream, raw, whole, series, faults, (*moved[0].shifts, *moved[1].shifts), pace,
-        _offset(raw, series), residual_of(raw, series, faults), _smallest(moved[1].blocks),
+        _offset(raw, series), residual_of(raw, series, faults), _smallest(moved[1]),
         _trace(raw) if told else (), constant, moved[1].blocks, moved[1].seen, moved[1].breathing_s,
     )  # fmt: skip
 
@@ -395,14 +395,15 @@ def without_clock_step(one: Examined, shift: Shift) -> Examined:
     return replace(one, series=put_back, residual=residual_of(one.raw, put_back, one.faults))
 
 
-def _smallest(blocks: Blocks | None) -> SmallestSeen:
+def _smallest(moved: Shifts) -> SmallestSeen:
+    blocks = moved.blocks
     if blocks is None:
         return SmallestSeen(None, None)
     step, over = smallest(blocks)
     length = float(blocks.time_s[-1] - blocks.time_s[0])
     if not np.isfinite(step) or length <= 0.0:
         return SmallestSeen(None, None)
-    return SmallestSeen(step, 1e6 * over / length)
+    return SmallestSeen(step, 1e6 * max(over, moved.beat_s) / length)
 
 
 def _offset(raw: Series, series: Series) -> float | None:
