@@ -48,6 +48,26 @@ def test_a_week_of_logs_becomes_an_entry_that_decides_a_verdict(tmp_path: Path) 
     assert said.bound_s <= float(offset.bound) <= said.bound_s * 1.0001
 
 
+def test_optimize_names_the_measured_clock_and_cautions_as_check_does(tmp_path: Path) -> None:
+    """Of two clocks the one from logs costs nothing until somebody fills its price in."""
+    text = SPEC.replace("candidates: [own_clock]", "candidates: [ocxo, own_clock]")
+    assert text != SPEC
+    text = text.replace("primitives: []", "primitives: [], cost: 1 EUR")
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(text, "utf-8")
+    logs = week_of_logs(tmp_path, 1e-6)
+    run("timing", *logs, "--as", "own_clock", "--write-catalog", tmp_path / "own_clock.yaml")
+    done = run("optimize", spec)
+    assert done.exit_code == 0, done.stdout + done.stderr
+    assert "uav clock" in done.stdout
+    assert "own_clock" in done.stdout.split("Warnings")[0]
+    told = json.loads(run("optimize", spec, "-o", "json:-").stdout)["warnings"]
+    checked = json.loads(run("check", spec, "-o", "json:-").stdout)["warnings"]
+    of_clock = {one["code"] for one in checked if one.get("entry") == "own_clock"}
+    assert {"measured-servo", "assumption"} <= of_clock
+    assert of_clock <= {one["code"] for one in told if one.get("entry") == "own_clock"}
+
+
 def test_signs_of_an_entry(tmp_path: Path) -> None:
     """A clock 1 ms late: host minus UTC is -1 ms; data stamped by it were valid 1 ms later."""
     source = np.random.default_rng(0)

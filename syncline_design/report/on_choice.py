@@ -8,11 +8,11 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from syncline_design.choice.evaluate import chosen_options, evaluate
+from syncline_design.choice.evaluate import chosen_clocks, chosen_options, evaluate
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import ROADS, FrontPoint, PriceStep
-from syncline_design.choice.table import Design, Problem
+from syncline_design.choice.table import Design, Problem, VehicleTable
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,
@@ -194,18 +194,19 @@ def family_designs_table(
     designs: Sequence[RankedDesign], currency: str, limit: numbers.Limited | None
 ) -> Table:
     """Payloads for several missions, best first; the error is the largest of any mission."""
+    named = _named_heads(designs)
     rows = [
         [
             Cell(str(place), float(place)),
             *(amount_cell(getattr(one, name), name, currency) for name in _RESOURCES),
             Cell(numbers.error(one.error_m, limit), one.error_m),
-            *_named_cells(one.design),
+            *_named_cells(one.design, named),
             ways_cell(one, currency, limit),
         ]
         for place, one in enumerate(designs, 1)
     ]
     heads = ("Place", "Cost #", "Mass #", "Power #", "Largest error #")
-    return table("Best designs", (*heads, *_named_heads(designs[:1]), "Ways of stamping it"), rows)
+    return table("Best designs", (*heads, *named, "Ways of stamping it"), rows)
 
 
 def family_front_table(
@@ -220,30 +221,34 @@ def family_front_table(
     figure: what it is drawn over in place of the Syncline error.
     """
     over = () if figure is None else (f"{figure[0].upper()}{figure[1:]} #",)
+    named = _named_heads(front)
     rows = [
         [
             amount_cell(getattr(one, resource), resource, currency),
             *(Cell(numbers.error(one.figure_m, limit), one.figure_m) for _ in over),
             Cell(numbers.error(one.error_m, limit), one.error_m),
-            *_named_cells(one.design),
+            *_named_cells(one.design, named),
         ]
         for one in front
     ]
     error = "Largest error #" if figure is None else "Largest Syncline error #"
-    heads = (f"{resource.capitalize()} #", *over, error, *_named_heads(front[:1]))
+    heads = (f"{resource.capitalize()} #", *over, error, *named)
     return table("Exact front", heads, rows)
 
 
 def _named_heads(designs: Sequence[RankedDesign | FrontDesign]) -> list[str]:
-    return [f"{stage.name} {role}" for one in designs for stage, role, _ in one.design.roles]
+    """Roles of the designs, which are alike in them, and the clocks where any has one."""
+    roles = [f"{stage.name} {role}" for one in designs[:1] for stage, role, _ in one.design.roles]
+    return [*roles, CLOCKS] if any(one.design.clocks for one in designs) else roles
 
 
-def _named_cells(design: NamedDesign) -> list[Cell]:
-    return [
-        Cell(f"{one.sensor} by {one.primitive}, {one.timestamping}") for _, _, one in design.roles
-    ]
+def _named_cells(design: NamedDesign, heads: Sequence[str]) -> list[Cell]:
+    roles = [f"{one.sensor} by {one.primitive}, {one.timestamping}" for _, _, one in design.roles]
+    clocks = "; ".join(f"{clock.vehicle}: {clock.id}" for clock in design.clocks) or "none"
+    return [Cell(text) for text in (*roles, clocks)][: len(heads)]
 
 
+CLOCKS = "Clocks"
 _RESOURCES: tuple[ResourceName, ...] = ("cost", "mass", "power")
 
 
@@ -258,13 +263,22 @@ def amount_cell(amount: Fraction | float | None, resource: str, currency: str) -
 
 
 def _role_heads(problem: Problem) -> list[str]:
-    return [f"{roles.stage_name} {roles.role}" for roles in problem.roles]
+    """Roles, and the vehicles whose clock is a choice."""
+    heads = [f"{roles.stage_name} {roles.role}" for roles in problem.roles]
+    return heads + [f"{vehicle.name} clock" for vehicle in problem.vehicles if _is_clocked(vehicle)]
+
+
+def _is_clocked(vehicle: VehicleTable) -> bool:
+    return any(clock.id is not None for clock in vehicle.clocks)
 
 
 def _role_cells(problem: Problem, design: Design) -> list[Cell]:
-    """`ublox_f9p_rtk by pps, gpio` per role."""
+    """`ublox_f9p_rtk by pps, gpio` per role, and the clocks."""
     options = chosen_options(problem, design)
-    return [Cell(f"{one.sensor} by {one.primitive}, {one.method}") for one in options]
+    roles = [f"{one.sensor} by {one.primitive}, {one.method}" for one in options]
+    chosen = zip(problem.vehicles, chosen_clocks(problem, design), strict=True)
+    clocks = [clock.id or "none" for vehicle, clock in chosen if _is_clocked(vehicle)]
+    return [Cell(text) for text in (*roles, *clocks)]
 
 
 def _open_text(requirements: Sequence[str]) -> str:

@@ -46,7 +46,7 @@ def cautions(
         *design_cautions(case, verified, figures),
         *waiver_cautions(case, verified.requirements),
         *_simulation(verified),
-        *_assumptions(assumed),
+        *assumption_cautions(assumed),
         *_transcripts(copied),
         *_incomplete(case),
     )
@@ -224,7 +224,7 @@ def _simulation(verified: Verified) -> Iterator[Caution]:
         )
 
 
-def _assumptions(assumed: Sequence[Assumption]) -> Iterator[Caution]:
+def assumption_cautions(assumed: Sequence[Assumption]) -> Iterator[Caution]:
     """Figures without a public source, one line an entry."""
     by_entry: dict[str, list[str]] = {}
     for one in assumed:

@@ -31,7 +31,8 @@ from syncline_design.spec.references import names_candidates
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.admitted import Kinds
 from syncline_design.verdict.alternatives import alternatives, bargains
-from syncline_design.verdict.cautions import design_cautions
+from syncline_design.verdict.cautions import assumption_cautions, design_cautions
+from syncline_design.verdict.cautions_of_facts import lifecycle_cautions
 from syncline_design.verdict.cautions_of_waivers import waiver_cautions
 from syncline_design.verdict.choice_data import (
     front_designs,
@@ -39,11 +40,13 @@ from syncline_design.verdict.choice_data import (
     ranked_designs,
     ruled_out,
 )
+from syncline_design.verdict.design_data import assumptions, used_entries
 from syncline_design.verdict.figure_front import (
     drawn_requirement,
     figure_front,
     figure_words,
 )
+from syncline_design.verdict.measured import claim_cautions
 from syncline_design.verdict.nearest import nearest
 from syncline_design.verdict.no_design import unfinished_verdict
 from syncline_design.verdict.open_choice import Picked, chosen_of, pick
@@ -122,7 +125,7 @@ def _told(
         result,
         verdict=word,
         designs=ranked_designs(case, problem, designs, folded=not settings.every),
-        warnings=_cautions(case, picked.verified, settings) if designs else (),
+        warnings=_cautions(case, problem, picked.verified, settings) if designs else (),
         waived=_waived(picked.verified) if word == "meets" else None,
         cut_short=tuple(pieces.cut_short),
         gave_up=tuple(pieces.gave_up),
@@ -141,14 +144,20 @@ def _waived(verified: Verified | None) -> tuple[str, ...] | None:
 
 
 def _cautions(
-    case: Case, verified: Verified | None, settings: OptimizeSettings
+    case: Case, problem: Problem, verified: Verified | None, settings: OptimizeSettings
 ) -> tuple[Caution, ...]:
-    """What a reader has to know of the best design."""
+    """What a reader has to know of the best design, and of the entries that it rests on."""
     if verified is None:
         return ()
     figures = error_figures(verified, settings.seed, statistics=True)
-    waivers = waiver_cautions(case, verified.requirements)
-    return (*design_cautions(case, verified, figures), *waivers)
+    entries = used_entries(case, problem, verified.design)
+    return (
+        *design_cautions(case, verified, figures),
+        *waiver_cautions(case, verified.requirements),
+        *assumption_cautions(assumptions(entries)),
+        *claim_cautions(case, entries),
+        *lifecycle_cautions(entries),
+    )
 
 
 def _unfinished(
