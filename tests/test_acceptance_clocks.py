@@ -244,12 +244,12 @@ def test_a_servo_that_nulls_its_own_offsets_bears_nothing_out(
     assert said is (status == "not_shown")
 
 
-def stamped(path: Path, fault_s: float, early_s: float = 0.0) -> Path:
-    """Ten minutes at 10 Hz, received with gamma delays of 0.1 ms; the second half moved."""
+def stamped(path: Path, fault_s: float, early_s: float = 0.0, transport_s: float = 1e-4) -> Path:
+    """Ten minutes at 10 Hz, received with gamma delays; the second half moved."""
     rng = np.random.default_rng(7)
     true_s = 1.7e9 + 0.1 * np.arange(6000)
     stamp_s = true_s - early_s + np.where(np.arange(6000) < 3000, 0.0, fault_s)
-    receive_s = true_s + 1e-4 * rng.gamma(2.0, size=6000)
+    receive_s = true_s + transport_s * rng.gamma(2.0, size=6000)
     rows = (f"{a:.9f},{b:.9f}" for a, b in zip(stamp_s, receive_s, strict=True))
     path.write_text("\n".join(["stamp_s,receive_s", *rows]) + "\n", "utf-8")
     return path
@@ -277,6 +277,18 @@ def test_a_step_that_stays_within_what_is_assumed_breaks_nothing(clocked: Path) 
     assert rows["position"]["status"] == "holds", rows["position"]
     assert "step" in rows["position"]["evidence"]
     assert 0.0005 < rows["position"]["measured"]["value"] <= 0.002
+
+
+@pytest.mark.parametrize(("fault_s", "status"), [(-0.001, "not_shown"), (-0.003, "broken")])
+def test_a_step_within_the_bound_is_not_broken_by_its_transport(
+    clocked: Path, fault_s: float, status: str
+) -> None:
+    """Receipts come up to 10 ms after their stamps; the step is 1 or 3 ms of it, 2 are assumed."""
+    log = stamped(clocked.parent / "uav_position.csv", fault_s, transport_s=1e-3)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == status, rows["position"]
+    assert "step" in rows["position"]["evidence"]
 
 
 @pytest.mark.parametrize(("messages", "status"), [(58, "not_shown"), (59, "holds")])

@@ -283,7 +283,7 @@ def _longer(needs_s: float | None) -> str:
     if needs_s is None:
         return "a longer log would do"
     if needs_s > LONGEST_S:
-        return "a log of quicker motion would do"
+        return "a log of other motion would do: `plan` names one"
     return f"a log of about {format_duration(_rounded_up(needs_s))} of such motion would do"
 
 

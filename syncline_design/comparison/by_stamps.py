@@ -63,13 +63,28 @@ def _recorded(stream: StreamAudit) -> float:
 
 
 def _within(faults: Sequence[StampFault], stream: StreamAudit, bound_s: float) -> bool:
-    """Whether faults that stay as they are keep the bound; a drift grows on."""
+    """Whether faults that stay as they are keep the bound; a drift grows on.
+
+    Receipts hold transport too: by them alone nothing is beyond a bound.
+    """
     return (
         not any("ppm" in fault.parameters for fault in faults)
         and all(any(True for _ in _sizes(fault, 0.0)) for fault in faults)
         and all(size <= bound_s for fault in faults for size in _sizes(fault, 0.0))
-        and _recorded(stream) <= bound_s
+        and min(_together(faults), _recorded(stream)) <= bound_s
     )
+
+
+def _together(faults: Sequence[StampFault]) -> float:
+    """The most that stamps are off by at any time, with every fault that has begun by then."""
+    moved, highest, lowest, others = 0.0, 0.0, 0.0, 0.0
+    for fault in sorted(faults, key=lambda one: one.from_s or 0.0):
+        by = fault.parameters.get("seconds")
+        if isinstance(by, float):
+            moved += by
+            highest, lowest = max(highest, moved), min(lowest, moved)
+        others += sum(_sizes(fault, 0.0)) - (abs(by) if isinstance(by, float) else 0.0)
+    return highest - lowest + others
 
 
 def _figure(faults: Sequence[StampFault], stream: StreamAudit) -> MeasuredFigure | None:
