@@ -10,9 +10,9 @@ import pytest
 
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.oddities import _differing
-from syncline_design.campaign.pool import Pool, pool_of
+from syncline_design.campaign.pool import Pool, Scoped, fitted, pool_of
 from syncline_design.campaign.store import read_store
-from syncline_design.campaign.unlike import unlike_logs
+from syncline_design.campaign.unlike import _difference, unlike_logs
 from syncline_design.diagnosis.sufficient import Sufficient
 from tests.test_joint import UNITS, made, statistics
 from tests.watched_series import BOUND, car_spec, kept, run_of, series, told, watch
@@ -38,6 +38,34 @@ def test_the_one_log_that_differs_is_found_with_its_effect() -> None:
     spread = float(one.judged.spread[0])
     assert abs(float(one.judged.values[0]) - apart) < 1.5 * spread
     assert one.log_p < -10.0
+
+
+def test_what_a_log_differs_by_is_known_though_neither_value_is() -> None:
+    """A bias whose column is nearly that of a common latency: each value of it is uncertain by 17
+    times what they differ by.  Stacked least squares: x'(X'X)^-1 x, x = (0, -1, 1)."""
+    rng, rows = np.random.default_rng(8), []
+    for sign in (1.0, 1.0, -1.0, 1.0):
+        columns = rng.standard_normal((64, 5)) / UNITS
+        columns[:, 4] = (columns[:, 0] * UNITS[0] + 0.02 * rng.standard_normal(64)) / UNITS[4]
+        late = np.array([0.6 * sign, 0.0, 0.0, 0.0, 0.0]) * UNITS
+        rows.append((columns, columns @ late + rng.standard_normal(64)))
+    pool = pool_of([statistics(*one) for one in rows], [0, 0, 1, 0])
+    latency, bias = (next(t for t in pool.terms if t.label[0] == n)
+                     for n in ("latency", "range_bias"))  # fmt: skip
+    apart = fitted(pool, [Scoped(latency, "build"), Scoped(bias, "start")])
+    design = np.concatenate([
+        np.column_stack([x[:, 0], x[:, 4] * (k != 2), x[:, 4] * (k == 2)])
+        for k, (x, _) in enumerate(rows)
+    ])  # fmt: skip
+    covariance = np.linalg.inv(design.T @ design)
+    told = np.array([0.0, -1.0, 1.0])
+    found = _difference(apart)
+    assert found.model[0, 0] == pytest.approx(told @ covariance @ told, rel=1e-6)
+    assert covariance[1, 1] > 300.0 * found.model[0, 0]
+    # and the effect that is named is the latency, which needs no parameter more
+    whole = pool_of([statistics(*one) for one in rows], list(range(4)))
+    (one,) = unlike_logs(whole, [t for t in whole.terms if t.label[0] == "latency"])
+    assert (one.run, one.term.label[0]) == (2, "latency")
 
 
 def test_another_value_in_every_log_is_no_odd_one() -> None:

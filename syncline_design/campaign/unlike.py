@@ -16,11 +16,10 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.naming import ratio
-from syncline_design.campaign.pool import Pool, Scoped, Term, fitted
+from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.scores import log_p_of
-from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 RATE: Final = 0.01  # chance that any of several alike logs is said to be unlike
@@ -79,16 +78,20 @@ def _unlike(pool: Pool, named: Sequence[Term], run: int) -> UnlikeLog | None:
     parted = replace(pool, starts=starts)
     charge = math.log(pool.count * max(len(pool.terms), 1))
     tried = [_held(parted, named, term, run, charge) for term in pool.terms]
-    found = [one for one in tried if one is not None and one.log_p < math.log(RATE)]
-    least = min((one.log_p for one in found), default=0.0)
-    close = [one for one in found if one.log_p <= least + AS_GOOD_NATS]
+    found = [one for one in tried if one is not None and one[0].log_p < math.log(RATE)]
+    most = max((explained for _, explained in found), default=0.0)
+    close = [one for one, explained in found if explained >= most - AS_GOOD_NATS]
     return min(close, key=lambda one: commonness(one.term.label), default=None)
 
 
 def _held(
     parted: Pool, named: Sequence[Term], term: Term, run: int, charge: float
-) -> UnlikeLog | None:
-    """One effect of one log; parted: that log as a start of its own."""
+) -> tuple[UnlikeLog, float] | None:
+    """One effect of one log, and what all that is free then explains, less its freedom [nat].
+
+    Beside a latency that is common a lag of one log's own does nearly what another latency would,
+    with a parameter more.  parted: that log as a start of its own.
+    """
     beside = [Scoped(one, "build") for one in named if one.label != term.label]
     common = fitted(parted, [*beside, Scoped(term, "build")])
     apart = fitted(parted, [*beside, Scoped(term, "start")])
@@ -99,14 +102,18 @@ def _held(
     temper = max(ratio(own), ratio(others))
     seen = int(np.sum(np.diag(parted.normal[run][np.ix_(term.index, term.index)]) > 0.0))
     log_p = log_p_of(2.0 * gain / temper, max(seen, 1)) + charge
-    return UnlikeLog(run, term, _difference(own, others), log_p)
+    unlike = UnlikeLog(run, term, _difference(apart), log_p)
+    return unlike, apart.gain - apart.values.size
 
 
-def _difference(own: Judged, others: Judged) -> Judged:
-    """A log's value less that of the others, their covariances added."""
-    return Judged(own.values - others.values, own.model + others.model, _both(own, others))
-
-
-def _both(own: Judged, others: Judged) -> tuple[tuple[Array, int], ...]:
-    pairs = zip(own.jackknives, others.jackknives, strict=False)
-    return tuple((a + b, min(m, n)) for (a, m), (b, n) in pairs)
+def _difference(apart: Fitted) -> Judged:
+    """d = t_own - t_others of the last effect, with D C D', D = (1, -1): what is common to both
+    (a lag beside a latency) is uncertain in each and not in what they differ by."""
+    others, own = apart.place[-1]
+    both = apart.judged(np.concatenate([own, others]))
+    less = np.hstack([np.eye(own.size), -np.eye(own.size)])
+    return Judged(
+        less @ both.values,
+        less @ both.model @ less.T,
+        tuple((less @ one @ less.T, count) for one, count in both.jackknives),
+    )
