@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,6 +24,7 @@ from syncline_design.logs.cells import (
 )
 from syncline_design.logs.parquet_footer import FooterError, chunks
 from syncline_design.logs.parquet_times import FarTimeError, calendar, spans
+from syncline_design.logs.parquet_unpacking import UnpackedColumns, UnreadableError
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_source import MOST_ROWS, PIECE, Clock, Mask, finite
 from syncline_design.spec.load import BadInput
@@ -33,26 +32,8 @@ from syncline_design.spec.load import BadInput
 if TYPE_CHECKING:
     import polars as pl
 
-ZONE_CHECK = "POLARS_IGNORE_TIMEZONE_PARSE_ERROR"
 MOST_TEXT = 4 * LONGEST_CELL + 16  # bytes of a cell in UTF-8, its length and what goes with it
 DICTIONARY = 2**21  # bytes of a chunk besides: its dictionary, the heads of its pages
-
-
-@contextmanager
-def any_zone() -> Iterator[None]:
-    """Lets polars open columns whose zone is an offset (`+05:30`, as Arrow writes it).
-
-    Without it polars panics over any zone that is no name of the time zone database.
-    """
-    before = os.environ.get(ZONE_CHECK)
-    os.environ[ZONE_CHECK] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[ZONE_CHECK]
-        else:
-            os.environ[ZONE_CHECK] = before
 
 
 class ParquetSource:
@@ -61,16 +42,12 @@ class ParquetSource:
     notes: tuple[str, ...]
 
     def __init__(self, path: Path) -> None:
-        import polars as pl
-
         self.path, self.cut, self.notes = path, 0, ()
         try:
-            with any_zone():
-                self._frame = pl.scan_parquet(path, glob=False, hive_partitioning=False)
-                self._schema = self._frame.collect_schema()
-                self.rows = int(self._frame.select(pl.len()).collect().item())
-        except (Exception, pl.exceptions.PanicException) as error:  # all of them the file's fault
+            self._columns = UnpackedColumns(path)
+        except UnreadableError as error:
             raise self._unreadable(error) from None
+        self._schema, self.rows = self._columns.schema, self._columns.rows
         self.header = tuple(self._schema.names())
         if len(self.header) > delimited.MOST_COLUMNS:
             most = f"at most {delimited.MOST_COLUMNS}"
@@ -79,17 +56,13 @@ class ParquetSource:
             most = f"at most {MOST_ROWS}"
             raise refuse(path, "too many rows", expected=most, found=str(self.rows))
 
-    def _unreadable(self, error: BaseException) -> BadInput:
-        found = (str(error).splitlines() or [type(error).__name__])[0][:160]
-        return refuse(self.path, "no readable Parquet file", found=found)
+    def _unreadable(self, error: Exception) -> BadInput:
+        return refuse(self.path, "no readable Parquet file", found=str(error))
 
     def _column(self, name: str, start: int = 0, rows: int | None = None) -> pl.Series:
-        import polars as pl
-
         try:
-            with any_zone():
-                return self._frame.slice(start, rows).select(name).collect().to_series(0)
-        except (Exception, pl.exceptions.PanicException) as error:
+            return self._columns.column(name, start, rows)
+        except UnreadableError as error:
             raise self._unreadable(error) from None
 
     def _pieces(self, name: str) -> Iterator[tuple[int, pl.Series]]:

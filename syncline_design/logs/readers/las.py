@@ -29,13 +29,14 @@ from syncline_design.logs.readers.epochs import (
 )
 from syncline_design.logs.readers.las_header import MAGIC, TIMED, LasClaims, claims_of
 from syncline_design.logs.readers.laz_cut import mended, whole_points
-from syncline_design.logs.readers.laz_probe import CRASH, LENGTH, Outside
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader, library
 from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.outside import Outside
 from syncline_design.spec.load import BadInput
 
 FORMAT = "LAS or LAZ cloud"
+CRASH = "the library that unpacks its points crashes there"
 PIECE_BYTES = 1 << 25
 LEAST_RECORD = 34  # bytes of LASzip's record without items
 PANIC = "PanicException"  # what a library in Rust raises beside all exceptions of Python
@@ -93,7 +94,7 @@ class LasRecording(BatchRecording):
         claims, there = self._claims, self._there()
         count = 0
         if claims.packed and self.sound is None:
-            outside = Outside(self.path)
+            outside = Outside(f"{__name__}:unpacked")
             for points in self._unpacked(outside):
                 count += len(points)
                 yield points
@@ -118,12 +119,15 @@ class LasRecording(BatchRecording):
         self._demand_points(count, said)
 
     def _unpacked(self, outside: Outside) -> Iterator[Any]:
-        """Points that another process unpacks; it ends where any are damaged."""
+        """Points that another process unpacks; it ends where any are damaged.
+
+        lazrs 0.8.2 reads outside its memory where the layers of a chunk are damaged.
+        """
         header = self._header()
         if header is None:
             return
         form = header.point_format
-        for piece in outside.pieces():
+        for piece in outside.pieces(os.fsencode(self.path)):
             raw = np.frombuffer(piece, form.dtype())
             yield self._laspy.ScaleAwarePointRecord(raw, form, header.scales, header.offsets)
 
@@ -241,14 +245,12 @@ class LasRecording(BatchRecording):
         return tuple(said)
 
 
-def tell(path: Path) -> None:
-    """Write the points piece by piece as they unpack (for `laz_probe`)."""
-    recording = LasRecording(path)
+def unpacked(request: bytes) -> Iterator[bytes]:
+    """The points of the cloud at a path, piece by piece as they unpack (in `Outside`)."""
+    recording = LasRecording(Path(os.fsdecode(request)))
     recording.sound = sys.maxsize
     for points in recording.clouds():
-        raw = points.array.tobytes()
-        sys.stdout.buffer.write(LENGTH.pack(len(raw)) + raw)
-        sys.stdout.buffer.flush()
+        yield points.array.tobytes()
 
 
 @contextmanager
