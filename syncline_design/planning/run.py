@@ -10,7 +10,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.planning.drives import WholeDrive, outcome, steered_s
 from syncline_design.planning.effort import ROWS_OF_A_DRIVE, Effort
-from syncline_design.planning.enough import shortest
+from syncline_design.planning.enough import Shortest, shortest
 from syncline_design.planning.placing import AREA_SHARE, LegTold, lasting_s, way_of
 from syncline_design.planning.search import LegSearch, best_within, together
 from syncline_design.planning.setup import SECONDS, PlanRequest, Setup
@@ -86,12 +86,23 @@ class _Planning:
         reaches = whole.judged or search.reaches(whole.legs)
         if search.is_over and not reaches:
             raise NoVerdict("the search ended before it came to a drive that tells what is asked")
-        enough = reaches and steered_s(self.setup.world, whole.legs) <= most_s
-        chosen = whole.legs if enough else best_within(search, most_s)
+        chosen = self._chosen(search, whole, most_s, reaches=reaches)
         in_force().doing("looking at the whole drive")
         chosen, found = self._judged(search, chosen, most_s)
-        least_s = self._least_s(reaches, found, whole.legs, most_s)
+        least_s = self._least_s(whole, found, most_s)
         return Telling(self.setup).whole(found, least_s, most_s)
+
+    def _chosen(
+        self, search: LegSearch, whole: Shortest, most_s: float, *, reaches: bool
+    ) -> list[LegTold]:
+        """The drive to tell: the one that is enough, else the best within the time.  Where nothing
+        is as short as that, the shorter of the two."""
+        whole_s = steered_s(self.setup.world, whole.legs)
+        if reaches and whole_s <= most_s:
+            return whole.legs
+        best = best_within(search, most_s)
+        best_s = steered_s(self.setup.world, best)
+        return whole.legs if whole.judged and best_s > most_s and whole_s <= best_s else best
 
     def _area(self) -> tuple[float, float] | None:
         """The tightest area of the vehicles that drive; PlanError where not one leg fits."""
@@ -135,16 +146,20 @@ class _Planning:
             return None
         return min(trials, key=lambda trial: search.value(trial)[1])[-1]
 
-    def _least_s(
-        self, reaches: bool, found: WholeDrive, whole: list[LegTold], most_s: float
-    ) -> float | None:
-        """The least time that reaches all: this drive's, a longer one's, or so much of its kind.
+    def _least_s(self, whole: Shortest, found: WholeDrive, most_s: float) -> float | None:
+        """The least time that reaches all: this drive's, another one's, or so much of its kind.
 
-        reaches: whether the longer one does.
+        A drive that is told for want of one within the time may be the shorter of both.  None
+        where no drive is enough as a whole, and more of the same would not help: two effects that
+        it does not tell apart do not part by its length.
         """
-        if self.setup.reached(found) and duration_s(found) <= most_s:
-            return duration_s(found)
-        if reaches:
-            return max(steered_s(self.setup.world, whole), 1.001 * most_s)
-        needed = times_needed(self.setup.judge, together(whole))
-        return None if needed is None else max(needed * lasting_s(whole), 1.001 * most_s)
+        known = [duration_s(found)] if self.setup.reached(found) else []
+        if known and known[0] <= most_s:
+            return known[0]
+        if whole.judged:
+            known.append(steered_s(self.setup.world, whole.legs))
+        if known:
+            return max(min(known), 1.001 * most_s)
+        needed = times_needed(self.setup.judge, together(whole.legs))
+        longer_s = None if needed is None else needed * lasting_s(whole.legs)
+        return longer_s if longer_s is not None and longer_s > most_s else None
