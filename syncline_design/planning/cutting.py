@@ -8,7 +8,6 @@ still is enough is found by halving.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import field
 from typing import Final
 
 import numpy as np
@@ -34,7 +33,6 @@ class Cutting:
     world: World
     stages: tuple[int, ...]
     enough: Judged
-    tried: list[LegTold] = field(default_factory=list)
 
     def shorter(self, than_s: float) -> LegTold | None:
         """The shortest swing that is enough and saves time that matters."""
@@ -67,5 +65,4 @@ class Cutting:
         if leg is None:
             return None
         told = self.world.placeable(leg, NOTHING, NOTHING, NOTHING)
-        self.tried.append(told)
         return told if self.enough(told) else None

@@ -112,9 +112,8 @@ def speed_words(speed: float) -> str:
 
 def _straight(v: Vehicle) -> tuple[str, CourseCommands]:
     ahead = ramps(v, [(v.fast_mps, LINE_S)], v.join_mps)
-    return f"straight ahead at {speed_words(v.fast_mps)} for {to_places(LINE_S, 0)} s", course(
-        ahead
-    )
+    words = f"straight ahead at {speed_words(v.fast_mps)} for {to_places(LINE_S, 0)} s"
+    return words, course(ahead)
 
 
 def _slow(v: Vehicle) -> tuple[str, CourseCommands]:
@@ -139,9 +138,8 @@ def _stop_and_go(v: Vehicle) -> tuple[str, CourseCommands] | None:
         return None
     ahead = ramps(v, [(reach, 1.0), (least, 1.0)] * 3, v.join_mps)
     slow = "a stop" if least == 0.0 else speed_words(least)
-    return f"three times from {slow} up to {speed_words(reach)} and back, straight ahead", course(
-        ahead
-    )
+    words = f"three times from {slow} up to {speed_words(reach)} and back, straight ahead"
+    return words, course(ahead)
 
 
 def _slow_and_fast(v: Vehicle) -> tuple[str, CourseCommands] | None:
@@ -171,9 +169,8 @@ def _speeds(v: Vehicle, hold_s: float) -> tuple[str, CourseCommands] | None:
 def _circle(v: Vehicle, sign: float) -> tuple[str, CourseCommands]:
     speed = _turning_speed(v)
     side = "right" if sign > 0 else "left"
-    return f"a full circle to the {side} at {speed_words(speed)}", turning(
-        v, speed, [sign * FULL_RAD]
-    )
+    words = f"a full circle to the {side} at {speed_words(speed)}"
+    return words, turning(v, speed, [sign * FULL_RAD])
 
 
 def _swinging_circle(v: Vehicle) -> tuple[str, CourseCommands] | None:

@@ -159,11 +159,10 @@ class PlanJudge:
         """The other effect that takes most of what is wanted at place k: its own first place, the
         sigma with it free, and what that may be."""
         index = list(self.goal.wanted)
-        vague = VAGUE * self.prior
-        row = int(np.argmax(self._shares(information)[:, k]))
-        widened = float(self.others.widened(information, index, vague)[row, k])
-        share = float(self._shares(information)[row, k])
-        return int(self.others.index[row, 0]), widened, widened / share
+        shares = self._shares(information)[:, k]
+        row = int(np.argmax(shares))
+        widened = self.others.widened(information, index, VAGUE * self.prior)[row, k]
+        return int(self.others.index[row, 0]), float(widened), float(widened / shares[row])
 
     def confusing(self, information: Array) -> list[int]:
         """First places of the effects that widen something more than they may."""
