@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.linuxptp import FOLLOWS_SYSTEM, SYSTEM
 from syncline_design.clocks.ntpd import LOOPSTATS
 from syncline_design.clocks.peers import bounded_by_peers, unlike_their_peers
 from syncline_design.clocks.result import ClockEntryKind
-from syncline_design.clocks.series import ClockSeries
+from syncline_design.clocks.series import Array, ClockSeries
 from syncline_design.clocks.sessions import sessions_of
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import percent
@@ -171,9 +172,20 @@ def _covered(one: ClockSeries, tracked: Sequence[ClockSeries]) -> float:
     if times.shape[0] < 2 or not len(one):
         return 0.0
     reach = max(10.0 * float(np.median(np.diff(times))), LONGEST_POLL_S)
-    after = np.clip(np.searchsorted(times, one.time_s), 1, times.shape[0] - 1)
-    apart = np.minimum(np.abs(one.time_s - times[after - 1]), np.abs(times[after] - one.time_s))
-    return float(np.mean(apart <= reach))
+    return float(np.mean(_apart_s(one.time_s, times, _after(one.time_s, times)) <= reach))
+
+
+def _after(asked_s: Array, known_s: Array) -> NDArray[np.int64]:
+    """Of each moment the known one that follows it; known_s: two or more, in order."""
+    return np.clip(np.searchsorted(known_s, asked_s), 1, known_s.shape[0] - 1)
+
+
+def _apart_s(asked_s: Array, known_s: Array, after: NDArray[np.int64]) -> Array:
+    """How far the nearest known moment is [s], of that after and the one before it."""
+    nearest: Array = np.minimum(
+        np.abs(asked_s - known_s[after - 1]), np.abs(known_s[after] - asked_s)
+    )
+    return nearest
 
 
 def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> SourceSelection:
@@ -219,10 +231,8 @@ def _sum(system: ClockSeries, card: ClockSeries) -> ClockSeries | None:
     known = card.part(np.isfinite(card.offset_s))
     if len(known) < 2:
         return None
-    after = np.clip(np.searchsorted(known.time_s, system.time_s), 1, len(known) - 1)
-    before_s = np.abs(system.time_s - known.time_s[after - 1])
-    after_s = np.abs(known.time_s[after] - system.time_s)
-    apart = np.minimum(before_s, after_s)
+    after = _after(system.time_s, known.time_s)
+    apart = _apart_s(system.time_s, known.time_s, after)
     locked = known.locked[after] & known.locked[after - 1]
     reach = max(10.0 * float(np.median(np.diff(known.time_s))), 1.0)
     kind = replace(system.kind, name=f"CLOCK_REALTIME by phc2sys and {card.kind.name}", rank=0,

@@ -16,6 +16,10 @@ from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 EventKind = Literal[
     "startup", "step", "unlock", "holdover", "gap", "relock", "leap_second", "frequency_jump"
 ]
+# after which a clock in steady state was off; a start comes before, a rate brings what it brings
+DISTURBANCES: Final[tuple[EventKind, ...]] = (
+    "step", "unlock", "holdover", "gap", "relock", "leap_second",
+)  # fmt: skip
 STARTUP_FACTOR: Final = 10.0  # of the session's median hard bound: what a start leaves behind
 GAP_FACTOR: Final = 10.0  # of the median interval between samples
 STEP_SIGMAS: Final = 12.0

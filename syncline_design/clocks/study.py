@@ -30,7 +30,13 @@ from syncline_design.clocks.result import (
 )
 from syncline_design.clocks.selection import SourceSelection, select, sign_of
 from syncline_design.clocks.series import Array
-from syncline_design.clocks.sessions import ClockSession, count_of, sessions_of, weighted_quantile
+from syncline_design.clocks.sessions import (
+    DISTURBANCES,
+    ClockSession,
+    count_of,
+    sessions_of,
+    weighted_quantile,
+)
 from syncline_design.clocks.times import moment
 from syncline_design.clocks.tolerance import (
     LEAST_SESSIONS,
@@ -151,8 +157,7 @@ def _figures(
     known = [s.hard_s for s in counted if not math.isnan(s.hard_s)]
     hard = max(known) if known else None
     bound = {"larger": max(seen, hard or 0.0), "statistical": seen, "hard": hard}[settings.use]
-    sizes = [e.bound_s for s in sessions for e in s.events
-             if e.kind not in ("startup", "frequency_jump")]  # fmt: skip
+    sizes = [e.bound_s for s in sessions for e in s.events if e.kind in DISTURBANCES]
     event = max([bound or 0.0, *(size + declared for size in sizes)])
     return _Figures(quantiles, statistical, hard, bound, event, method)
 
@@ -351,7 +356,7 @@ def _notes(
     if off is not None:
         said.append(off)
     alone = max((e.daemon_s for s in sessions for e in s.events), default=0.0)
-    if alone > max(figures.bound_s or 0.0, 0.0):
+    if alone > (figures.bound_s or 0.0):
         most = format_duration(rounded(alone, 3))
         said.append(f"while lock was lost the clock may have been {most} off, by the daemon's own "
                     "word: the bound with events says so")  # fmt: skip

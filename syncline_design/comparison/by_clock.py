@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from syncline_design.clocks.result import Timing
+from syncline_design.clocks.sessions import DISTURBANCES
 from syncline_design.clocks.study import TimingStudy
 from syncline_design.clocks.trend import RUN_OFF
 from syncline_design.comparison.acceptance import AssumptionStatus, MeasuredFigure
@@ -15,7 +16,6 @@ from syncline_design.model.figure_text import format_duration, percent, to_digit
 from syncline_design.spec.case import Case
 from syncline_design.verdict.measured import COMMONLY, coverage_of, coverage_words
 
-DISTURBED: Final = ("step", "unlock", "holdover", "gap", "relock", "leap_second")
 LONGER: Final = 1.001  # than the sessions: a horizon that they do not show
 
 
@@ -65,7 +65,7 @@ def seen_s(found: Timing) -> float:
 
 def _not_beyond(bound_s: float, found: Timing) -> str:
     """Of logs with a bound beyond the assumed one, and no session that was: what would do."""
-    disturbed = [e for e in found.events if e.kind in DISTURBED and e.size_s > bound_s]
+    disturbed = [e for e in found.events if e.kind in DISTURBANCES and e.size_s > bound_s]
     if not disturbed:
         return f"beyond that: {narrowed_by(found)}"
     worst = max(disturbed, key=lambda event: event.size_s)
