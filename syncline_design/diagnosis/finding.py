@@ -18,6 +18,7 @@ from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.effects.record import Effect
 from syncline_design.model.figure_text import (
+    format_chance,
     format_components,
     format_estimate,
     format_nats,
@@ -98,11 +99,7 @@ def finding(
 
 def evidence_words(gain: float, log10_p: float | None) -> str:
     """What an effect saves, and the chance that noise alone saves as much (None: none at all)."""
-    chance = "less than 1e-300"
-    if log10_p is not None and log10_p > -300.0:
-        power = math.floor(log10_p)
-        digit = round(10.0 ** (log10_p - power))
-        chance = f"{digit}e{power:03d}" if digit < 10 else f"1e{power + 1:03d}"
+    chance = format_chance(log10_p)
     return f"saves {format_nats(gain)}; noise alone does that with a chance of {chance}"
 
 

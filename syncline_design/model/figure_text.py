@@ -165,6 +165,15 @@ def to_places(value: float, places: int, sign: bool = False) -> str:
     return f"{value:{'+' if sign else ''}z.{places}f}"  # z: what rounds to zero has no sign
 
 
+def format_chance(log10_p: float | None) -> str:
+    """`3e-05`: a chance by its decimal logarithm, to one figure; None: none at all."""
+    if log10_p is None or log10_p <= -300.0:
+        return "less than 1e-300"
+    power = math.floor(log10_p)
+    digit = round(10.0 ** (log10_p - power))
+    return f"{digit}e{power:03d}" if digit < 10 else f"1e{power + 1:03d}"
+
+
 def format_nats(nats: float, digits: int | None = None) -> str:
     """`13 436.0 nat`: thousands grouped; one decimal, or so many significant figures."""
     text = to_places(nats, 1) if digits is None else to_digits(nats, digits)

@@ -8,7 +8,7 @@ from typing import Final
 
 from syncline_design.diagnosis.result import Estimate, Finding, Joint, LogAlone, UnlikeOthers
 from syncline_design.machine.sentences import sentence_list
-from syncline_design.model.figure_text import format_estimates
+from syncline_design.model.figure_text import format_chance, format_estimates
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
@@ -98,14 +98,12 @@ def unlike_words(one: UnlikeOthers) -> str:
     """`log 4 (d.csv) is unlike the others: latency (position) differs there by ...`."""
     parts = [f"{split_suffix(name)[0].replace('_', ' ')} by {own.text}"
              for name, own in one.differs.items() if own.seen]  # fmt: skip
-    chance = f"{numbers.number(10.0 ** max(one.log10_chance, -300.0), 2)}"
-    if one.log10_chance < -300.0:
-        chance = f"less than {chance}"
     what = f"{one.effect.replace('_', ' ')} ({one.sensor})"
     return (
         f"log {one.number} ({', '.join(one.files)}) is unlike the others: {what} differs there, "
         f"{sentence_list(parts)}; noise alone does that with a chance of "
-        f"{chance}, all logs and effects counted. What is said here is what the others say together"
+        f"{format_chance(one.log10_chance)}, all logs and effects counted. What is said here is "
+        "what the others say together"
     )
 
 
