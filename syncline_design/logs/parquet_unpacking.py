@@ -1,4 +1,4 @@
-"""UnpackedColumns of Parquet files, unpacked in a process of its own: damaged ones may end it.
+"""Columns of Parquet files, unpacked in a process of its own: damaged ones may end it.
 
 polars 2.1.0 panics over damaged pages, with a trace on the error stream, and asks for any memory
 that they claim; where there is none, it aborts.  All files share one process, which ends with the

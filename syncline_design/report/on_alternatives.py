@@ -58,15 +58,12 @@ def bargain_nodes(
 def _bargain(one: Bargain, currency: str, limit: numbers.Limited | None) -> str:
     money = numbers.money(abs(one.extra), currency)
     old, new = (numbers.error(value, limit) for value in (one.error_from_m, one.error_to_m))
-    sensors = ", ".join(
-        [
-            *(f"{role.name} ({role.timestamping})" for _, _, role in one.design.roles),
-            *(f"clock of {clock.vehicle}: {clock.name}" for clock in one.design.clocks),
-        ]
-    )
+    sensors = (f"{role.name} ({role.timestamping})" for _, _, role in one.design.roles)
+    clocks = (f"clock of {clock.vehicle}: {clock.name}" for clock in one.design.clocks)
+    payload = ", ".join([*sensors, *clocks])
     if one.kind == "better":
-        return f"{money} more takes the error from {old} to {new}: {sensors}"
-    return f"{money} less if the error may be {new} instead of {old}: {sensors}"
+        return f"{money} more takes the error from {old} to {new}: {payload}"
+    return f"{money} less if the error may be {new} instead of {old}: {payload}"
 
 
 def ways_cell(one: RankedDesign, currency: str, limit: numbers.Limited | None) -> Cell:

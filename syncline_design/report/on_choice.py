@@ -194,19 +194,19 @@ def family_designs_table(
     designs: Sequence[RankedDesign], currency: str, limit: numbers.Limited | None
 ) -> Table:
     """Payloads for several missions, best first; the error is the largest of any mission."""
-    named = _named_heads(designs)
+    clocked = _clocked(designs)
     rows = [
         [
             Cell(str(place), float(place)),
             *(amount_cell(getattr(one, name), name, currency) for name in _RESOURCES),
             Cell(numbers.error(one.error_m, limit), one.error_m),
-            *_named_cells(one.design, named),
+            *_named_cells(one.design, clocked=clocked),
             ways_cell(one, currency, limit),
         ]
         for place, one in enumerate(designs, 1)
     ]
     heads = ("Place", "Cost #", "Mass #", "Power #", "Largest error #")
-    return table("Best designs", (*heads, *named, "Ways of stamping it"), rows)
+    return table("Best designs", (*heads, *_named_heads(designs), "Ways of stamping it"), rows)
 
 
 def family_front_table(
@@ -221,31 +221,36 @@ def family_front_table(
     figure: what it is drawn over in place of the Syncline error.
     """
     over = () if figure is None else (f"{figure[0].upper()}{figure[1:]} #",)
-    named = _named_heads(front)
+    clocked = _clocked(front)
     rows = [
         [
             amount_cell(getattr(one, resource), resource, currency),
             *(Cell(numbers.error(one.figure_m, limit), one.figure_m) for _ in over),
             Cell(numbers.error(one.error_m, limit), one.error_m),
-            *_named_cells(one.design, named),
+            *_named_cells(one.design, clocked=clocked),
         ]
         for one in front
     ]
     error = "Largest error #" if figure is None else "Largest Syncline error #"
-    heads = (f"{resource.capitalize()} #", *over, error, *named)
+    heads = (f"{resource.capitalize()} #", *over, error, *_named_heads(front))
     return table("Exact front", heads, rows)
 
 
 def _named_heads(designs: Sequence[RankedDesign | FrontDesign]) -> list[str]:
     """Roles of the designs, which are alike in them, and the clocks where any has one."""
     roles = [f"{stage.name} {role}" for one in designs[:1] for stage, role, _ in one.design.roles]
-    return [*roles, CLOCKS] if any(one.design.clocks for one in designs) else roles
+    return [*roles, CLOCKS] if _clocked(designs) else roles
 
 
-def _named_cells(design: NamedDesign, heads: Sequence[str]) -> list[Cell]:
-    roles = [f"{one.sensor} by {one.primitive}, {one.timestamping}" for _, _, one in design.roles]
-    clocks = "; ".join(f"{clock.vehicle}: {clock.id}" for clock in design.clocks) or "none"
-    return [Cell(text) for text in (*roles, clocks)][: len(heads)]
+def _clocked(designs: Sequence[RankedDesign | FrontDesign]) -> bool:
+    return any(one.design.clocks for one in designs)
+
+
+def _named_cells(design: NamedDesign, *, clocked: bool) -> list[Cell]:
+    texts = [f"{one.sensor} by {one.primitive}, {one.timestamping}" for _, _, one in design.roles]
+    if clocked:
+        texts.append("; ".join(f"{one.vehicle}: {one.id}" for one in design.clocks) or "none")
+    return [Cell(text) for text in texts]
 
 
 CLOCKS = "Clocks"

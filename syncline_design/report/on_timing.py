@@ -104,9 +104,9 @@ def _outcome(result: Timing) -> Outcome:
 
 def _turns(meaning: TimingMeaning | None) -> bool:
     """Whether the spec meets its requirements, and not with the measured clock."""
-    return meaning is not None and meaning.before == "meets" and meaning.after not in (
-        None, "meets",
-    )  # fmt: skip
+    return (
+        meaning is not None and meaning.before == "meets" and meaning.after not in (None, "meets")
+    )
 
 
 def _sentences(result: Timing) -> Iterator[str]:
