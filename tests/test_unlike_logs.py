@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.oddities import _differing
 from syncline_design.campaign.pool import Pool, Scoped, fitted, pool_of
-from syncline_design.campaign.store import read_store
+from syncline_design.campaign.store import add_run, read_store
 from syncline_design.campaign.unlike import _difference, unlike_logs
 from syncline_design.diagnosis.sufficient import Sufficient
+from syncline_design.diagnosis.system import pinned_system
+from syncline_design.spec.load import BadInput, load
 from tests.test_joint import UNITS, made, statistics
 from tests.watched_series import BOUND, car_spec, kept, run_of, series, told, watch
 from tests.watched_series import statistics as day_of
@@ -145,3 +148,56 @@ def test_a_run_that_is_left_out_is_counted_no_more_and_said(tmp_path: Path) -> N
     forged = [*lines[:at], lines[at].replace("another vehicle", "a vehicle"), *lines[at + 1 :]]
     store.write_text("\n".join(forged) + "\n", encoding="ascii")
     assert watch(store, spec).exit_code == 2
+
+
+def test_a_run_that_was_left_out_is_taken_back_and_both_are_told(tmp_path: Path) -> None:
+    """It rings, does not without the run, and rings again; the file only grows."""
+    spec = car_spec(tmp_path / "car.yaml")
+    found_in = series(4, 6, np.array([20.0, 0, 0, 0, 0]) * BOUND, 5)
+    store = kept(spec, tmp_path, [run_of(one, k) for k, one in enumerate(found_in)])
+    first = told(spec, store, tmp_path, 1)
+    for run, words in (("6", "not left out"), ("7", "there is no run 7")):
+        refused = watch(store, "--take-back", run, "--reason", "x")
+        assert refused.exit_code == 2
+        assert words in refused.output + refused.stderr
+    assert watch(store, "--leave-out", "6", "--reason", "another vehicle").exit_code == 0
+    told(spec, store, tmp_path, 0)
+    before = store.read_bytes()
+    for words in (("--take-back", "6"), ("--take-back", "6", "--accept", "--reason", "x")):
+        assert watch(store, *words).exit_code == 2
+    assert store.read_bytes() == before
+    said = watch(store, "--take-back", "6", "--reason", "a wrong label")
+    assert said.exit_code == 0, said.output
+    assert store.read_bytes().startswith(before)
+    again = told(spec, store, tmp_path, 1)
+    assert again["alarms"] == first["alarms"]
+    assert all("left_out" not in one for one in again["runs"])
+    for page in (again["cautions"][0], (tmp_path / "watch.html").read_text("utf-8")):
+        assert "run 6 (day5.csv) counts again since" in page
+        assert "a wrong label" in page
+        assert "another vehicle" in page
+    assert watch(store, "--leave-out", "6", "--reason", "after all").exit_code == 0
+    (out,) = [one for one in told(spec, store, tmp_path, 0)["cautions"] if "run 6" in one]
+    assert out.endswith(": after all")
+
+
+def test_another_run_of_the_time_of_one_that_is_left_out_may_be_added(tmp_path: Path) -> None:
+    """A log with wrong columns, and the same drive exported anew; one of them counts."""
+    spec = car_spec(tmp_path / "car.yaml")
+    runs = [run_of(one, k) for k, one in enumerate(series(4, 4, 0.0 * BOUND, 9))]
+    anew = replace(runs[3], first_s=runs[2].first_s, date=runs[2].date, files=("day2b.csv",))
+    store, case = kept(spec, tmp_path, runs[:3]), load(spec)
+    with pytest.raises(BadInput, match="--leave-out 3"):
+        add_run(store, "car", pinned_system(case), anew)
+    assert watch(store, "--leave-out", "3", "--reason", "wrong columns").exit_code == 0
+    with pytest.raises(BadInput, match=r"left out since .*--take-back 3"):
+        add_run(store, "car", pinned_system(case), runs[2])
+    add_run(store, "car", pinned_system(case), anew)
+    refused = watch(store, "--take-back", "3", "--reason", "both")
+    assert refused.exit_code == 2
+    assert "of the same time as run 4" in " ".join((refused.output + refused.stderr).split())
+    assert watch(store, "--leave-out", "4", "--reason", "the first was right").exit_code == 0
+    assert watch(store, "--take-back", "3", "--reason", "the first was right").exit_code == 0
+    nothing = tmp_path / "none.jsonl"
+    assert watch(nothing, "--leave-out", "1", "--reason", "x").exit_code == 2
+    assert not nothing.exists()

@@ -1,7 +1,7 @@
 """The runs of one system on disk: a file of lines that only grows, each bound to all before it.
 
 Lines are runs, baselines, what looks at the runs found (`looks`), and runs that are left out from
-there on (`left_out`): a run stays in the file, and is counted no more.
+there on or taken back (`omissions`): a run stays in the file, whether it counts or not.
 
 A line is {"previous": P, "sha256": H, "body": B}; P is the H of the line before (64 zeros at the
 start), H the SHA-256 of P and of B in canonical JSON.  A line that was changed, taken out, put in
@@ -18,13 +18,14 @@ import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
 from syncline_design import __version__
+from syncline_design.campaign import omissions
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.looks import KeptLook
+from syncline_design.campaign.omissions import Omission, OmissionError
 from syncline_design.campaign.packing import PackingError
 from syncline_design.campaign.twice import is_same
 from syncline_design.diagnosis.same_system import description, differences
@@ -59,21 +60,13 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class LeftOut:
-    """That a run is counted no more: since when, and why."""
-
-    since: str
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
 class Stored:
     """A store that was read.
 
     system: what it is a store of (`same_system.description`).  baselines: after how many runs a
-    new baseline was set.  looks: what looks found, by their keys.  left_out: runs that are counted
-    no more, by their numbers.  torn: bytes of a last line that
-    a kill left without its end.  last: hash of the last line.  content: all whole lines.
+    new baseline was set.  looks: what looks found, by their keys.  omitted: which runs were left
+    out and taken back, in that order.  torn: bytes of a last line that a kill left without its end.
+    last: hash of the last line.  content: all whole lines.
     """
 
     path: Path
@@ -82,7 +75,7 @@ class Stored:
     entries: tuple[Entry, ...]
     baselines: tuple[int, ...]
     looks: Mapping[str, KeptLook]
-    left_out: Mapping[int, LeftOut]
+    omitted: tuple[Omission, ...]
     torn: int
     last: str
     content: bytes = field(repr=False)
@@ -92,15 +85,19 @@ class Stored:
         return tuple(one.run for one in self.entries)
 
     @property
+    def left_out(self) -> Mapping[int, Omission]:
+        """The runs that are counted no more, by their numbers."""
+        return omissions.left_out(self.omitted)
+
+    @property
     def counted(self) -> tuple[Entry, ...]:
         """The runs that are not left out."""
-        return tuple(one for one in self.entries if one.number not in self.left_out)
+        out = self.left_out
+        return tuple(one for one in self.entries if one.number not in out)
 
     def left_out_words(self) -> Iterator[str]:
-        """What is left out, in sentences without their full stop."""
-        for number, one in sorted(self.left_out.items()):
-            files = ", ".join(self.entries[number - 1].run.files)
-            yield f"run {number} ({files}) is left out since {one.since}: {one.reason}"
+        """What is left out and what was taken back, in sentences without their full stop."""
+        return omissions.words(self.omitted, [run.files for run in self.runs])
 
 
 def read_store(path: Path, known: Stored | None = None) -> Stored | None:
@@ -132,12 +129,12 @@ def _stored(path: Path, content: bytes, known: Stored | None) -> Stored | None:
     entries: list[Entry] = []
     baselines: list[int] = []
     looks: dict[str, KeptLook] = {}
-    left_out: dict[int, LeftOut] = {}
+    omitted: list[Omission] = []
     if known is not None and kept.startswith(known.content):
         first, rest = 1 + known.content.count(b"\n"), kept[len(known.content) :]
         name, system, last = known.name, known.system, known.last
         entries, baselines = list(known.entries), list(known.baselines)
-        looks, left_out = dict(known.looks), dict(known.left_out)
+        looks, omitted = dict(known.looks), list(known.omitted)
     for line, text in enumerate(rest.splitlines(), first):
         body, last = _checked(path, line, text, last)
         kind = body.get("kind")
@@ -149,15 +146,15 @@ def _stored(path: Path, content: bytes, known: Stored | None) -> Stored | None:
             baselines.append(len(entries))
         elif kind == "looks":
             looks |= _looks(path, line, body)
-        elif kind == "left_out":
-            left_out |= _left_out(path, line, body, len(entries))
+        elif kind in omissions.KINDS:
+            omitted.append(_omission(path, line, body, omitted, len(entries)))
         else:
-            expected = "run, baseline, looks or left_out"
+            expected = f"run, baseline, looks or {' or '.join(omissions.KINDS)}"
             raise refused(path, f"a line of kind {kind!r}", expected, line)
     if system is None:
         return None  # nothing but what a kill left of the first line
-    return Stored(path, name, system, tuple(entries), tuple(baselines), looks, left_out, torn,
-                  last, kept)  # fmt: skip
+    return Stored(path, name, system, tuple(entries), tuple(baselines), looks,
+                  tuple(omitted), torn, last, kept)  # fmt: skip
 
 
 def _checked(path: Path, line: int, text: bytes, previous: str) -> tuple[dict[str, Any], str]:
@@ -206,15 +203,13 @@ def _looks(path: Path, line: int, body: dict[str, Any]) -> dict[str, KeptLook]:
     return {one.key: one for one in found}
 
 
-def _left_out(path: Path, line: int, body: dict[str, Any], runs: int) -> dict[int, LeftOut]:
+def _omission(
+    path: Path, line: int, body: dict[str, Any], known: Sequence[Omission], runs: int
+) -> Omission:
     try:
-        number = int(body["run"])
-        found = LeftOut(str(body["since"]), str(body["reason"]))
-    except (KeyError, TypeError, ValueError) as error:
-        raise _unreadable(path, line, "a run that is left out", error) from None
-    if not 1 <= number <= runs:
-        raise refused(path, f"damaged: run {number} is left out, and there are {runs}", "", line)
-    return {number: found}
+        return omissions.omission_of(body, known, runs)
+    except OmissionError as error:
+        raise _unreadable(path, line, "an omission", error) from None
 
 
 def _unreadable(path: Path, line: int, what: str, error: Exception) -> BadInput:
@@ -241,15 +236,19 @@ def demand_known(stored: Stored, sha256: str, files: Sequence[Path]) -> None:
     """Refuse files that hold, to the byte, what a run of the store was read from."""
     for one in stored.entries:
         if one.run.sha256 == sha256:
-            raise _twice(stored.path, ", ".join(map(str, files)), one)
+            raise _twice(stored, ", ".join(map(str, files)), one)
 
 
-def _twice(path: Path, files: str, one: Entry) -> BadInput:
+def _twice(stored: Stored, files: str, one: Entry) -> BadInput:
+    out = stored.left_out.get(one.number)
+    back = f"watch {stored.path} --take-back {one.number} --reason TEXT"
     return refused(
-        path,
+        stored.path,
         f"{files}: this run is in the store already, as number {one.number} "
-        f"({', '.join(one.run.files)})",
+        f"({', '.join(one.run.files)})"
+        + (f", left out since {out.since}: {out.reason}" if out is not None else ""),
         "a log that was not added before",
+        hint=f"where it is to count again: `{back}`" if out is not None else "",
     )
 
 
@@ -260,13 +259,21 @@ def demand_new(stored: Stored | None, run: Run, path: Path) -> None:
     found = run.statistics()
     for one in stored.entries:
         if run.sha256 == one.run.sha256 or is_same(found, one.found):
-            raise _twice(path, ", ".join(run.files), one)
+            raise _twice(stored, ", ".join(run.files), one)
+    _demand_apart(stored, run, path)
+
+
+def _demand_apart(stored: Stored, run: Run, path: Path) -> None:
+    """Refuse a run of the time of another that counts."""
+    for one in stored.counted:
         if _overlap_s(run, one.run) > OVERLAP * min(run.duration_s, one.run.duration_s):
             raise refused(
                 path,
                 f"{', '.join(run.files)} is of the same time as run {one.number} "
                 f"({', '.join(one.run.files)}): what it tells would count twice",
                 "a run of another time",
+                hint=f"leave out the one that is wrong: `watch {path} --leave-out {one.number} "
+                "--reason TEXT`",
             )
 
 
@@ -321,20 +328,22 @@ def add_baseline(path: Path) -> None:
     append_line(path, line)
 
 
-def add_left_out(path: Path, number: int, reason: str) -> None:
-    """Append that a run is counted no more, and why."""
-    since = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+def add_omission(path: Path, number: int, reason: str, *, back: bool = False) -> None:
+    """Append that a run is counted no more (back: counts again), and why."""
+    one = omissions.begun_now(number, reason, back=back)
 
     def line(kept: bytes) -> bytes:
         stored = _stored(path, kept, None)
-        if stored is None or not 1 <= number <= len(stored.entries):
-            runs = 0 if stored is None else len(stored.entries)
-            raise refused(path, f"there is no run {number} to leave out", f"one of {runs} runs")
-        if number in stored.left_out:
-            known = stored.left_out[number]
-            raise refused(path, f"run {number} is left out since {known.since} already")
-        body = {"kind": "left_out", "run": number, "since": since, "reason": reason}
-        return _line(stored.last, body)[0]
+        if stored is None:
+            raise refused(path, "no runs", "a store that `watch` added runs to")
+        try:
+            omissions.demand_following(one, stored.omitted, len(stored.entries))
+        except OmissionError as error:
+            expected = f"a run that is {'' if back else 'not '}left out"
+            raise refused(path, str(error), expected) from None
+        if back:
+            _demand_apart(stored, stored.runs[number - 1], path)
+        return _line(stored.last, one.body)[0]
 
     append_line(path, line)
 

@@ -24,8 +24,8 @@ from syncline_design.campaign.store import (
     Entry,
     Stored,
     add_baseline,
-    add_left_out,
     add_looks,
+    add_omission,
     add_run,
     by_date,
     demand_known,
@@ -122,11 +122,13 @@ def accept(store: Path) -> Stored:
     return found
 
 
-def leave_out(store: Path, run: int, reason: str) -> Stored:
-    """Count a run of a store no more; it stays in the file."""
+def leave_out(store: Path, run: int, reason: str, *, back: bool = False) -> Stored:
+    """Count a run of a store no more (back: count it again); it stays in the file."""
     if not reason.strip():
-        raise refused(store, "no reason to leave a run out", "a reason, which every look repeats")
-    add_left_out(store, run, reason.strip())
+        raise refused(store, "no reason given", "a reason, which every look repeats")
+    if read_store(store) is None:  # before a file is made of nothing
+        raise refused(store, "no runs", "a store that `watch` added runs to")
+    add_omission(store, run, reason.strip(), back=back)
     found = read_store(store)
     assert found is not None
     return found

@@ -48,8 +48,18 @@ def watch(
             show_default=False,
         ),
     ] = None,
+    take_back: Annotated[
+        int | None,
+        typer.Option(
+            "--take-back",
+            min=1,
+            help="Count the run of this number again that was left out.",
+            show_default=False,
+        ),
+    ] = None,
     reason: Annotated[
-        str, typer.Option("--reason", help="Why a run is left out.", show_default=False)
+        str,
+        typer.Option("--reason", help="Why a run is left out or taken back.", show_default=False),
     ] = "",
     output: WatchOutput = None,
     seed: SeedOption = 0,
@@ -73,10 +83,13 @@ def watch(
 ) -> int:
     """Add a run to those of a system, and say what changed since when."""
     deadline = deadline_of(time_limit)
-    if leave_out is not None and accept:
-        refuse("syncline-design: watch: --accept and --leave-out are two calls")
-    if leave_out is not None:
-        return _leave_out(store, leave_out, reason, spec, output, quiet=quiet)
+    run = leave_out if take_back is None else take_back
+    if sum((leave_out is not None, take_back is not None, accept)) > 1:
+        refuse("syncline-design: watch: --accept, --leave-out and --take-back are calls of "
+               "their own")  # fmt: skip
+    if run is not None:
+        back = take_back is not None
+        return _leave_out(store, run, reason, spec, output, back=back, quiet=quiet)
     if accept:
         return _accept(store, spec, output, quiet=quiet)
     if spec is None:
@@ -102,17 +115,25 @@ def watch(
 
 
 def _leave_out(
-    store: Path, run: int, reason: str, spec: Path | None, output: list[str] | None, *, quiet: bool
+    store: Path,
+    run: int,
+    reason: str,
+    spec: Path | None,
+    output: list[str] | None,
+    *,
+    back: bool,
+    quiet: bool,
 ) -> int:
-    """A run that counts no more, said in a line."""
+    """A run that counts no more, or again, said in a line."""
+    option = "--take-back" if back else "--leave-out"
     if spec is not None or output:
-        refuse("syncline-design: watch STORE --leave-out N --reason TEXT takes nothing else")
+        refuse(f"syncline-design: watch STORE {option} N --reason TEXT takes nothing else")
     if not reason.strip():
-        refuse("syncline-design: watch --leave-out: expected --reason TEXT, which every later look "
+        refuse(f"syncline-design: watch {option}: expected --reason TEXT, which every later look "
                "repeats")  # fmt: skip
     from syncline_design.campaign.watching import leave_out as leave_run_out
 
-    stored = leave_run_out(store, run, reason)
+    stored = leave_run_out(store, run, reason, back=back)
     text = f"{store}: " + "; ".join(stored.left_out_words())
     emit(text, [], lambda name: name, quiet=quiet)
     return 0
