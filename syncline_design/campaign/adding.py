@@ -68,6 +68,7 @@ def kept(one: SearchedLog, digest: str, promise: SpecPromise | None) -> Run:
         white_factor={"/".join(w.sensor): float(f) for w, f in white},
         named=tuple(_named(f) for f in weighed.findings),
         version=__version__,
+        checks=tuple(c for c in weighed.checks if c.severity == "contradiction"),
         **statistics_of(sufficient(data, model, one.search.states)),  # type: ignore[arg-type]
     )
 

@@ -79,6 +79,10 @@ class Change:
     covariance: Array
     log_factor: float
 
+    def is_of(self, other: Change) -> bool:
+        """Whether both are of one effect from one run on."""
+        return (self.term.label, self.k) == (other.term.label, other.k)
+
 
 @dataclass(frozen=True, slots=True)
 class Group:
@@ -176,7 +180,7 @@ class Changes:
         if not less:
             return np.ones(len(self.terms))
         whole = self.pool.normal[run]
-        values = _pseudo_inverse(whole + np.diag(self.prior)) @ self.pool.score[run]
+        values = pseudo_inverse(whole + np.diag(self.prior)) @ self.pool.score[run]
         found = np.zeros((len(less), len(self.terms)))
         for k, part in enumerate(less):
             left = part.score - part.normal @ values
@@ -205,7 +209,7 @@ class Changes:
     def doubt(self, look: int) -> float:
         """log (1 + sum p_a L_a): how much likelier the first runs are where some effect may differ
         from run to run than where none does."""
-        runs, inside = self._runs(look), self._inside(look)
+        runs, inside = self.compared(look), self.inside(look)
         prior = runs.total - runs.normal.sum(axis=0)
         usual = runs.normal.mean(axis=0)
         found = [np.zeros(1)]
@@ -240,7 +244,7 @@ class Changes:
         """log B_ck of every k from 1 and c, (look - 1, C)."""
         found = np.zeros((look - 1, len(self.terms)))
         for group, normal, score in zip(self.groups, *self._freed(look), strict=True):
-            inside = self._inside(look)[group.terms]
+            inside = self.inside(look)[group.terms]
             found[:, group.terms] = log_bayes(
                 normal / inside[:, None, None],
                 score / inside[:, None],
@@ -279,7 +283,7 @@ class Changes:
         """N (look - 1, G, p, p) and s (look - 1, G, p) of every k from 1, by group of terms."""
         if look in self._last:
             return self._last[look]
-        runs = self._runs(look)
+        runs = self.compared(look)
         normal, score, inverse = runs.normal, runs.score, runs.inverse
         later = np.cumsum(normal[::-1], axis=0)[::-1][1:]
         scores = np.cumsum(score[::-1], axis=0)[::-1][1:]
@@ -295,16 +299,16 @@ class Changes:
 
     def _reach(self, look: int, group: Group) -> Array:
         """D (G, p, p): REACH^2 times one run's covariance, by how the runs were driven."""
-        return REACH**2 * inverted(self._runs(look).normal.mean(axis=0)[group.blocks])
+        return REACH**2 * inverted(self.compared(look).normal.mean(axis=0)[group.blocks])
 
     def temper(self, look: int) -> Array:
         """Variance over that fitted, of every k from 1 and c: inside runs, and between them."""
         found = np.zeros((look - 1, len(self.terms)))
-        for group, scatter in zip(self.groups, self._runs(look).scatters, strict=True):
+        for group, scatter in zip(self.groups, self.compared(look).scatters, strict=True):
             found[:, group.terms] = scatter.factor[:-1]
-        return np.asarray(self._inside(look) * found)
+        return np.asarray(self.inside(look) * found)
 
-    def _inside(self, look: int) -> Array:
+    def inside(self, look: int) -> Array:
         """Variance by the scatter of the parts of runs over that fitted, (C,)."""
         return np.asarray(np.maximum(1.0, self.within[:look].mean(axis=0)))
 
@@ -318,7 +322,7 @@ class Changes:
     def between_of(self, k: int) -> Array:
         """The same of one k, (C,)."""
         found = np.ones(len(self.terms))
-        for group, scatter in zip(self.groups, self._runs(k).scatters, strict=True):
+        for group, scatter in zip(self.groups, self.compared(k).scatters, strict=True):
             found[group.terms] = scatter.factor[-1]
         return found
 
@@ -326,7 +330,7 @@ class Changes:
     def _latest(self) -> dict[int, Runs]:
         return {}
 
-    def _runs(self, look: int) -> Runs:
+    def compared(self, look: int) -> Runs:
         """The first `look` runs, what clearly differs from one to the next freed in each."""
         if look not in self._latest:
             found = self._compared(look, self.pool.normal[:look], self.pool.score[:look])
@@ -344,13 +348,13 @@ class Changes:
 
     def differing(self, look: int) -> tuple[Differing, ...]:
         """Effects that clearly differ from run to run, of the first `look` runs."""
-        return self._runs(look).freed
+        return self.compared(look).freed
 
     def _compared(self, look: int, normal: Array, score: Array) -> Runs:
         """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
         together; parted at every k from 1, and not parted."""
-        total = self._total(look, normal, score)
-        inverse = _pseudo_inverse(total)
+        total = self.total(look, normal, score)
+        inverse = pseudo_inverse(total)
         left = score - normal @ (inverse @ score.sum(axis=0))
         found = []
         for g in self.groups:
@@ -358,7 +362,7 @@ class Changes:
             squares = scattered(blocks, inverted(blocks), left[:, g.index])
             seen = np.sum(np.einsum("rgaa->rga", blocks) > 0.0, axis=-1)
             found.append(
-                RunScatter.of(squares / self._inside(look)[g.terms], seen, g.index.shape[1])
+                RunScatter.of(squares / self.inside(look)[g.terms], seen, g.index.shape[1])
             )
         return Runs(normal, score, total, inverse, tuple(found))
 
@@ -386,12 +390,12 @@ class Changes:
             float(chance[named]) + math.log(len(self.terms)),
         )
 
-    def _total(self, look: int, normal: Array, score: Array) -> Array:
+    def total(self, look: int, normal: Array, score: Array) -> Array:
         """Information of runs together, with the prior of what they show."""
         total = normal.sum(axis=0)
         prior, held = np.diag(total) / PLAUSIBLE**2, np.zeros_like(total)
         groups = tuple((g.terms, g.index) for g in self.groups)
-        for one in shown_constants(total, score.sum(axis=0), groups, self._inside(look)):
+        for one in shown_constants(total, score.sum(axis=0), groups, self.inside(look)):
             prior[one.index] = 0.0
             held[np.ix_(one.index, one.index)] = one.prior
         found: Array = total + held + np.diag(np.maximum(prior, self.prior))
@@ -413,7 +417,7 @@ def _own_covariance(normal: Array, term: Term) -> Array:
     return inverted(normal[np.ix_(term.index, term.index)])
 
 
-def _pseudo_inverse(total: Array) -> Array:
+def pseudo_inverse(total: Array) -> Array:
     """total^-1 (..., P, P), columns scaled alike first."""
     size = np.diagonal(total, axis1=-2, axis2=-1)
     scale = np.sqrt(np.where(size > 0.0, size, 1.0))

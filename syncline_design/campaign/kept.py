@@ -9,9 +9,10 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.packing import PackingError, lower, packed, unpacked, whole
+from syncline_design.diagnosis.result import Check
 from syncline_design.diagnosis.sufficient import Less, Sufficient, TermLabel
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Record
+from syncline_design.machine.records import Record, optional
 
 EARLIEST_S: Final = 946_684_800.0  # 2000-01-01: a first stamp from here on is a time of day
 LATEST_S: Final = 4_102_444_800.0  # 2100-01-01
@@ -48,7 +49,8 @@ class Run(Record):
     date: the same as a date where it is one.  verdict, left_m: what the log alone was said to be,
     and the RMS [m] of what it left unexplained.  spec_m: RMS [m] that the spec's noise makes on it.
     white_factor: its noise over the spec's, by sensor.  parameters: `effect/sensor/stage/name`, in
-    the order of the statistics (`diagnosis.sufficient`).
+    the order of the statistics (`diagnosis.sufficient`).  checks: where it contradicts itself or
+    the platform's limits; None of a run that was kept before they were.
     """
 
     files: tuple[str, ...]
@@ -73,6 +75,7 @@ class Run(Record):
     square: float
     gram: str
     less: tuple[PartsKept, ...]
+    checks: tuple[Check, ...] | None = optional()
 
     def statistics(self) -> Sufficient:
         """The statistics unpacked; PackingError where they are not what they say."""

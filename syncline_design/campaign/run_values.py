@@ -10,7 +10,7 @@ import numpy as np
 
 from syncline_design.campaign.changes import Change, Changes
 from syncline_design.campaign.naming import Naming
-from syncline_design.campaign.pool import Fitted, Pool, Term, fitted, inverted
+from syncline_design.campaign.pool import Fitted, Index, Pool, Term, fitted, inverted
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -29,27 +29,29 @@ class RunParameter:
 
 
 def run_values(
-    changes: Changes, seen: Sequence[Change], rate: float
+    changes: Changes, seen: Sequence[Change], rate: float, strange: Sequence[int] = ()
 ) -> tuple[tuple[RunParameter, ...], ...]:
     """Each effect's parameters by every run alone, beside what all runs name together.
 
     seen: the changes that were seen; one that went back is none by all runs.  They are taken off
     before anything is named, or the mean of a change would pass for what the system has all along
     and shift the runs before it; off what is fitted, too, but for the course of the very effect
-    that changed.
+    that changed.  strange: places of runs that are unlike the others, which name nothing.
     """
+    stays = np.array([k for k in range(changes.pool.count) if k not in strange], dtype=np.int64)
     standing: list[Change] = []
     for one in seen:
-        if _stands(reduce(Changes.without, standing, changes).pool, one):
+        if _stands(reduce(Changes.without, standing, changes).pool, one, stays):
             standing.append(one)
     quiet = reduce(Changes.without, standing, changes).pool
-    named = Naming(quiet, rate, MOST_NAMED, whole=("build",)).named().fit
+    alike = quiet.part(stays)
+    named = Naming(alike, rate, MOST_NAMED, whole=("build",)).named().fit
     found: list[list[RunParameter]] = [[] for _ in range(quiet.count)]
     for c, term in enumerate(quiet.terms):
         rest = tuple(s for s in named.scoped if s.term.label != term.label)
         others = [one for one in standing if one.term.label != term.label]
         pool = reduce(Changes.without, others, changes).pool
-        values, inverse = _alone(pool, fitted(quiet, rest), term)
+        values, inverse = _alone(pool, fitted(alike, rest), term)
         grown = max(1.0, float(np.mean(changes.within[:, c])))
         spread = np.sqrt(grown * np.einsum("rkk->rk", inverse))
         for run, k in np.ndindex(values.shape):
@@ -59,17 +61,17 @@ def run_values(
     return tuple(map(tuple, found))
 
 
-def _stands(pool: Pool, one: Change) -> bool:
-    """Whether all runs are likelier with a change than without it, with one value of everything.
+def _stands(pool: Pool, one: Change, stays: Index) -> bool:
+    """Whether runs are likelier with a change than without it, with one value of everything.
 
     log L(d) = sum over its runs (g_c' d - d' I_cc d / 2) + (g - w)' S^+ (g - w) / 2,
     with g and S of all runs together and w = sum over its runs I_c d.
     """
-    own, d = one.term.index, one.values
-    later = pool.normal[one.k :].sum(axis=0)
-    score, total = pool.score.sum(axis=0), inverted(pool.normal.sum(axis=0))
+    own, d, after = one.term.index, one.values, stays[stays >= one.k]
+    later = pool.normal[after].sum(axis=0)
+    score, total = pool.score[stays].sum(axis=0), inverted(pool.normal[stays].sum(axis=0))
     left = score - later[:, own] @ d
-    gained = pool.score[one.k :, own].sum(axis=0) @ d - 0.5 * d @ later[np.ix_(own, own)] @ d
+    gained = pool.score[after][:, own].sum(axis=0) @ d - 0.5 * d @ later[np.ix_(own, own)] @ d
     return bool(gained + 0.5 * left @ total @ left > 0.5 * score @ total @ score)
 
 

@@ -15,7 +15,7 @@ from syncline_design.campaign.sight import limits_of
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.unlike import RATE, UnlikeLog
 from syncline_design.diagnosis.consequence import Weights, promise_of
-from syncline_design.diagnosis.finding import estimate, evidence_words, finding
+from syncline_design.diagnosis.finding import estimate, evidence_words, finding, in_words
 from syncline_design.diagnosis.gap_result import Remaining, WholeGap
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.plotted import (
@@ -34,6 +34,7 @@ from syncline_design.diagnosis.result import (
     Noise,
     PerLog,
     Rival,
+    Scope,
     SpecRead,
     UnlikeOthers,
 )
@@ -43,13 +44,15 @@ from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.sight import DetectionLimit, alone, informative
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects import registry
-from syncline_design.effects.record import Array
+from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import student_limit
+from syncline_design.model.figure_text import format_estimates
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.case import Case
 
 MOST_NATS = 300.0
+MOST_TOLD = 3  # logs whose own values a sentence tells
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +127,22 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
     term, effect = one.scoped.term, one.scoped.term.effect
     stage = told.stages[term.stage]
     k = [s.term.label for s in told.named.fit.scoped].index(term.label)
-    shown = _estimates(term, one.judged)
+    shown = estimates(term, one.judged)
     if one.scoped.scope != "build":
         shown = on_average(term, told.named.fit.of(k), shown)
     size_m = _size_m(told, k)
-    values = tuple((name, e.value) for name, e in shown.items())
-    material = weights.material(size_m, EffectEntry(effect.name, term.sensor, stage, values))
+    scope = one.scoped.scope
+    logs = tuple(_per_log(told, _apart(told, k) if scope == "build" else told.named.fit, k))
+    said = [shown] if scope == "build" else [log.parameters for log in logs]
+    material = any(
+        weights.material(
+            size_m,
+            EffectEntry(
+                effect.name, term.sensor, stage, tuple((name, e.value) for name, e in own.items())
+            ),
+        )
+        for own in said
+    )
     words = evidence_words(one.gain, one.log_p / math.log(10.0))
     aliases = tuple(_rival(told, b) for b in one.rivals)
     total = 1.0 + sum(_odds(b.nats_worse) for b in aliases)
@@ -138,14 +151,38 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
         effect, term.sensor, stage, shown, words, one.gain, one.log_p / math.log(10.0),
         (aliases, (), ()), material, size_m,
     )  # fmt: skip
-    scope = one.scoped.scope
     tested = one.tested.logs if one.tested.starts is None else one.tested.starts
     found = replace(found, scope=scope, one_value=tested)
     if scope == "build":
-        return replace(found, each_log=tuple(_per_log(told, _apart(told, k), k)))
-    found = replace(found, per_log=tuple(_per_log(told, told.named.fit, k)))
+        return replace(found, each_log=logs)
+    texts = {name: _ends_text([log.parameters[name] for log in logs]) for name in shown}
+    parameters = {name: replace(own, text=texts[name]) for name, own in shown.items()}
+    sentence = _differing_words(effect, term.sensor, logs, scope)
+    return replace(found, per_log=logs, parameters=parameters, sentence=sentence)
+
+
+def _ends_text(each: Sequence[Estimate]) -> str:
+    """`-12.9 ± 0.3 ms to 14.6 ± 0.3 ms`: the ends of values that are not one."""
+    seen = [one for one in each if one.seen and not isinstance(one.value, str)]
+    if not seen:
+        return each[0].text
+    low, high = (pick(seen, key=lambda one: one.value) for pick in (min, max))
+    pairs = [(float(one.value), one.standard_uncertainty) for one in (low, high)]
+    texts = format_estimates(pairs, low.unit)
+    return texts[0] if texts[0] == texts[1] else f"{texts[0]} to {texts[1]}"
+
+
+def _differing_words(effect: Effect, sensor: str, logs: Sequence[PerLog], scope: Scope) -> str:
+    """What each log says where they disagree; of many, the two whose first values are the ends."""
     every = "at every start" if scope == "start" else "in every log"
-    return replace(found, sentence=f"{found.sentence} on average, another value {every}")
+    said = list(logs)
+    if len(said) > MOST_TOLD:
+        first = next(iter(said[0].parameters))
+        said.sort(key=lambda one: float(one.parameters[first].value))
+        said = [said[0], said[-1]]
+    words = "; ".join(f"{one.file}: {in_words(effect, sensor, one.parameters)}" for one in said)
+    ends = f" (the ends of {len(logs)})" if len(said) < len(logs) else ""
+    return f"The logs disagree, another value {every}: {words}{ends}"
 
 
 def _odds(worse: float) -> float:
@@ -157,7 +194,7 @@ def _rival(told: Told, one: WorseFit) -> Rival:
     return Rival(name, sensor, told.stages[stage], one.cosine, one.worse, one.possible)
 
 
-def _estimates(term: Term, judged: Judged) -> dict[str, Estimate]:
+def estimates(term: Term, judged: Judged) -> dict[str, Estimate]:
     """Parameters with the uncertainty and interval to rely on."""
     found = {}
     slopes = [p.name for p in term.effect.slopes()]
@@ -207,7 +244,7 @@ def _per_log(told: Told, fit: Fitted, k: int) -> Iterator[PerLog]:
     group = told.pool.group_of(one.scope)
     for run, entry in enumerate(told.entries):
         judged = fit.judged(fit.place[k][group[run]])
-        yield PerLog(entry.number, entry.run.files[0], entry.start, _estimates(one.term, judged))
+        yield PerLog(entry.number, entry.run.files[0], entry.start, estimates(one.term, judged))
 
 
 def _size_m(told: Told, k: int) -> float:
@@ -343,7 +380,7 @@ def _unlike(told: Told) -> Iterator[UnlikeOthers]:
     """Logs that are unlike all the others."""
     for entry, one in told.unlike:
         name, sensor, stage = one.term.label
-        differs = _estimates(one.term, one.judged)
+        differs = estimates(one.term, one.judged)
         chance = one.log_p / math.log(10.0)
         yield UnlikeOthers(entry.number, entry.run.files, name, sensor, told.stages[stage], differs,
                            chance)  # fmt: skip

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Final, Literal
 
-from syncline_design.diagnosis.result import NOT_SHOWN, Informative, LogOutcome, SpecRead
+from syncline_design.diagnosis.result import (
+    NOT_SHOWN,
+    Check,
+    Informative,
+    LogOutcome,
+    SpecRead,
+    UnlikeOthers,
+)
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.figure_text import to_digits
@@ -38,7 +45,7 @@ class WatchedRun(Record):
 
     baseline: which baseline it belongs to, from 1.  e_value: the evidence for a change up to this
     run, since its baseline; null of the first.  new: whether this call added it.  left_out: true
-    of a run that is counted no more.
+    of a run that is counted no more.  checks: where it contradicts itself or the platform's limits.
     """
 
     run: int
@@ -53,6 +60,7 @@ class WatchedRun(Record):
     new: bool
     values: tuple[RunValue, ...]
     left_out: bool | None = optional()
+    checks: tuple[Check, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +94,8 @@ class Alarm(Record):
     """One parameter that changed: by how much, in SI, and since when.
 
     words: a convention that is another, which has no figure; then `change` is null.  text: the
-    change as outputs print it.  first_run: at which run the alarm was first due.
+    change as outputs print it.  first_run: at which run the alarm was first due.  alone: true where
+    the runs before and after `since` are alike, and differ from that one run.
     """
 
     effect: str
@@ -104,6 +113,7 @@ class Alarm(Record):
     first_run: int
     aliases: tuple[Other, ...]
     words: str | None = optional()
+    alone: bool | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +143,8 @@ class Watch(Record):
     are in the order of their dates.  cautions: what is odd in the last run and no change.
     last: hash of the store's last line.  torn: bytes of a line that a kill had left.
     informative: whether the last run could have shown a change that would turn the verdict.
+    unlike: runs that are unlike all the others, each with every effect in which it is, the clearest
+    first; unlike_rate: the chance that any of several alike runs is said to be, over all looks.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -150,6 +162,14 @@ class Watch(Record):
     torn: int
     provenance: WatchProvenance
     informative: Informative
+    unlike: tuple[UnlikeOthers, ...] | None = optional()
+    unlike_rate: float | None = optional()
+
+    @property
+    def contradicted(self) -> tuple[WatchedRun, ...]:
+        """Runs that count and contradict themselves or the limits of the spec's platform."""
+        own = (run for run in self.runs if run.run > self.baseline_after and not run.left_out)
+        return tuple(run for run in own if run.checks)
 
     @property
     def exit_code(self) -> int:
@@ -157,6 +177,8 @@ class Watch(Record):
         return 1 if self.alarms else 0
 
     def demanded_exit_code(self, *, informative: bool) -> int:
-        """The exit code; 3 where nothing changed in runs of which the last could not show it."""
-        hidden = informative and not self.alarms and not self.informative.ok
+        """The exit code; 3 where nothing changed in runs of which the last could not show it, or
+        of which one does not belong to the others."""
+        bears_out = self.informative.ok and not self.unlike and not self.contradicted
+        hidden = informative and not self.alarms and not bears_out
         return NOT_SHOWN if hidden else self.exit_code

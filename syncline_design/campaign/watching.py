@@ -13,11 +13,11 @@ import numpy as np
 
 from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
-from syncline_design.campaign.changes import Change, Changes
+from syncline_design.campaign.changes import Change
+from syncline_design.campaign.compared_runs import ComparedRuns, Seen
 from syncline_design.campaign.joint import JointError
-from syncline_design.campaign.looks import KeptLook, keys_of, known_first
+from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.oddities import cautions
-from syncline_design.campaign.pool import Pool, Term, pool_of
 from syncline_design.campaign.run_values import RunParameter, run_values
 from syncline_design.campaign.sight import sight
 from syncline_design.campaign.store import (
@@ -34,6 +34,9 @@ from syncline_design.campaign.store import (
     read_store,
     refused,
 )
+from syncline_design.campaign.strangers import RATE as STRANGER_RATE
+from syncline_design.campaign.strangers import Stranger, standing_alone, strangers
+from syncline_design.campaign.telling import estimates
 from syncline_design.campaign.watch_result import (
     Alarm,
     Other,
@@ -45,13 +48,11 @@ from syncline_design.campaign.watch_result import (
     WatchRule,
     e_value_text,
 )
-from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.finding import estimate
-from syncline_design.diagnosis.result import SpecRead
+from syncline_design.diagnosis.result import SpecRead, UnlikeOthers
 from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.system import pinned_system
-from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -64,10 +65,6 @@ METHOD: Final = (
     "e-process: Bayes factors of a change of each effect from each run on, mixed; false alarms "
     "count over all looks since a baseline (Ville's inequality)"
 )
-AS_GOOD_NATS: Final = 2.0
-RIVAL_NATS: Final = 3.0
-MOST_CHANGES: Final = 4
-CREDIBLE: Final = 0.95
 SHOWN: Final = 2.0  # standard uncertainties from which a parameter of a changed effect is told
 
 
@@ -150,20 +147,12 @@ def _add(
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """A change that was seen: the best, at which look first, how sure, what else it could be."""
-
-    change: Change
-    low: int
-    high: int
-    first_look: int
-    log_evidence: float
-    others: tuple[tuple[Term, float], ...]
-
-
-@dataclass(frozen=True, eq=False)
 class Watching:
-    """A store looked at."""
+    """A store looked at.
+
+    A run unlike all the others, before and after, would hide what else changed: it makes every
+    effect of it one that differs from run to run.  So the others are looked at without it, too.
+    """
 
     case: Case
     request: WatchRequest
@@ -177,101 +166,51 @@ class Watching:
         return tuple(by_date(tuple(e for e in self.stored.counted if e.number > after)))
 
     @cached_property
-    def pool(self) -> Pool:
-        entries = self.ordered or self.stored.entries[-1:]
-        return pool_of([e.found for e in entries], [e.start for e in entries])
+    def every(self) -> ComparedRuns:
+        return ComparedRuns(self.stored, self.ordered, -math.log(self.request.rate))
+
+    @cached_property
+    def strange(self) -> tuple[Stranger, ...]:
+        """Runs that are unlike all the others, by their places."""
+        return strangers(self.every.changes) if self.ordered else ()
+
+    @cached_property
+    def alone(self) -> tuple[int, ...]:
+        """Places of those among them that stand alone between runs that are alike."""
+        return standing_alone(self.strange, len(self.ordered))
+
+    @cached_property
+    def rest(self) -> ComparedRuns:
+        """The runs but for those."""
+        if not self.alone:
+            return self.every
+        runs = tuple(e for k, e in enumerate(self.ordered) if k not in self.alone)
+        return ComparedRuns(self.stored, runs, self.every.threshold)
 
     @property
-    def course(self) -> Array:
-        """log E_n after each look, from the second run on."""
-        return self.changes.course[1:]
-
-    @cached_property
-    def keys(self) -> tuple[str, ...]:
-        """Of the look after each run."""
-        return self._keys(self.ordered)
-
-    def _keys(self, runs: Sequence[Entry]) -> tuple[str, ...]:
-        listed = [self.pool.labels, [term.label for term in self.pool.terms]]
-        return tuple(keys_of(listed, [entry.line for entry in runs]))
-
-    @cached_property
-    def kept(self) -> tuple[KeptLook, ...]:
-        """What earlier looks at these runs found, as the store holds it."""
-        return known_first(self.stored.looks, self.keys, len(self.pool.terms))
-
-    @cached_property
-    def doubted(self) -> int | None:
-        """The run after which a kept look says what its runs do not; None where none does.
-
-        At every call another of them is computed again.
-        """
-        if not self.kept:
-            return None
-        at = len(self.stored.entries) % len(self.kept)
-        anew = _look(self.keys[at], *Changes(self.pool, self.kept).found_anew(at + 1))
-        return None if anew.is_like(self.kept[at]) else at
-
-    @cached_property
-    def changes(self) -> Changes:
-        return Changes(self.pool, self.kept if self.doubted is None else ())
-
-    @cached_property
     def fresh(self) -> tuple[KeptLook, ...]:
         """Looks that the store does not hold, or holds wrongly."""
-        first = len(self.kept) if self.doubted is None else 0
-        places = range(first, len(self.ordered))
-        return tuple(_look(self.keys[k], *self.changes.found_by(k + 1)) for k in places)
+        more = () if self.rest is self.every else self.rest.fresh
+        known = {one.key for one in self.every.fresh}
+        return (*self.every.fresh, *(one for one in more if one.key not in known))
 
     @property
-    def threshold(self) -> float:
-        return -math.log(self.request.rate)
-
-    @cached_property
-    def seen(self) -> tuple[Seen, ...]:
-        """Changes that were alarmed at any look so far, the strongest first."""
-        first = next((k + 2 for k, e in enumerate(self.course) if e >= self.threshold), None)
-        if first is None:
-            first = self._rang
-        if first is None:
-            return ()
-        found: list[Seen] = []
-        changes, look = self.changes, len(self.ordered)
-        while len(found) < MOST_CHANGES:
-            at = look
-            total, table = changes.log_evidence(at)
-            if found and total < self.threshold:
-                break
-            if not found and total < math.log(2.0):  # it went back, which is a change of its own
-                at = first
-                total, table = changes.log_evidence(at)
-            found.append(_best(changes, at, table, first, total))
-            changes = changes.without(found[-1].change)
-        return tuple(found)
-
-    @cached_property
-    def _rang(self) -> int | None:
-        """The place from 1 of the run whose look rang when it was added, before runs of earlier
-        dates came in; an alarm stays, whatever is added."""
-        if self.doubted is not None:
-            return None
-        added = sorted(self.ordered, key=lambda entry: entry.number)
-        begun = [entry.run.first_s for entry in added]
-        if begun == sorted(begun):  # nothing came in late: the course is what the looks found
-            return None
-        for n in range(2, len(added)):
-            look = self.stored.looks.get(self._keys(tuple(by_date(tuple(added[:n]))))[-1])
-            if look is not None and look.log_evidence >= self.threshold:
-                return 1 + self.ordered.index(added[n - 1])
+    def doubted(self) -> Entry | None:
+        """The run after which a kept look says what its runs do not; None where none does."""
+        for course in (self.every, self.rest):
+            if course.doubted is not None:
+                return course.runs[course.doubted]
         return None
 
     def told(self, torn: int) -> Watch:
         """All of it as a result."""
         stored, case = self.stored, self.case
-        alarms = [a for one in self.seen for a in self._alarms(one)]
+        alarms = [a for one in self.rest.seen for a in self._alarms(one)]
+        alarms += [] if alarms else self._alone_alarms()
         alarms += self._conventions()
         dated = all(e.run.date is not None for e in self.ordered)
-        last = float(self.course[-1]) if len(self.course) else None
+        evidence, unlike = self.rest.evidence, tuple(self._unlike())
+        last = float(evidence[-1]) if len(evidence) else None
         return Watch(
             verdict="alarm" if alarms else "unchanged",
             spec=SpecRead(case.spec.name, str(case.path)),
@@ -283,23 +222,63 @@ class Watching:
                            max(len(self.ordered) - 1, 0)),
             baseline_after=stored.baselines[-1] if stored.baselines else 0,
             ordered_by="date" if dated else "adding",
-            cautions=self._cautions(),
-            informative=sight(case, self.changes, len(self.ordered), self.request.rate),
+            cautions=self._cautions(unlike),
+            informative=sight(case, self.rest.changes, len(self.rest.runs), self.request.rate),
             last=stored.last,
             torn=torn,
             provenance=WatchProvenance(__version__, case.spec_sha256, case.catalogs_sha256),
+            unlike=unlike or None,
+            unlike_rate=STRANGER_RATE if unlike else None,
         )  # fmt: skip
 
-    def _cautions(self) -> tuple[str, ...]:
-        seen = [one.change for one in self.seen]
-        odd = cautions(self.ordered, self.doubted, self.changes, seen, self._stage)
+    def _cautions(self, unlike: Sequence[UnlikeOthers]) -> tuple[str, ...]:
+        seen = [one.change for one in self.rest.seen]
+        odd = cautions(self.ordered, self.doubted, unlike, self.rest.changes, seen, self._stage)
         return (*self.stored.left_out_words(), *odd)
+
+    def _unlike(self) -> Iterator[UnlikeOthers]:
+        """Runs that are unlike the others, but for those that a change explains."""
+        for stranger in self.strange:
+            if self._is_explained(stranger):
+                continue
+            entry = self.ordered[stranger.run]
+            for one in stranger.departures:
+                name, sensor, stage = one.term.label
+                yield UnlikeOthers(
+                    entry.number, entry.run.files, name, sensor, self._stage(stage),
+                    estimates(one.term, one.judged), one.log_p / math.log(10.0),
+                )  # fmt: skip
+
+    def _is_explained(self, stranger: Stranger) -> bool:
+        """Whether a change that is told says it: one of several runs alike, or of one effect."""
+        if not self.rest.seen or stranger.run in self.alone:
+            return False
+        beside = (one for one in self.strange if abs(one.run - stranger.run) == 1)
+        if any(stranger.is_like(one) for one in beside):
+            return True
+        told = {one.change.term.label for one in self.rest.seen}
+        return len(stranger.departures) == 1 and stranger.departures[0].term.label in told
+
+    def _alone_alarms(self) -> Iterator[Alarm]:
+        """Where what rang is of single runs, which the others before and after do not have."""
+        first = self.every.first_look
+        if first is None or not self.alone:
+            return
+        evidence = float(self.every.evidence[first - 2])
+        for one in (s for s in self.strange if s.run in self.alone):
+            for departure in one.departures:
+                change = Change(departure.term, one.run, departure.judged.values,
+                                departure.judged.model, evidence)  # fmt: skip
+                seen = Seen(change, one.run, one.run, first, evidence, ())
+                found = self._alarms(seen, self.every)
+                yield from (replace(alarm, alone=True) for alarm in found)
 
     def _stage(self, index: int) -> str:
         return self.case.spec.stages[index].name
 
-    def _alarms(self, one: Seen) -> Iterator[Alarm]:
+    def _alarms(self, one: Seen, course: ComparedRuns | None = None) -> Iterator[Alarm]:
         """An alarm for each parameter of an effect that clearly changed; at least the clearest."""
+        runs = (course or self.rest).runs
         change, term = one.change, one.change.term
         slopes = term.effect.slopes()
         spread = np.sqrt(np.maximum(np.diag(change.covariance), 0.0))
@@ -322,17 +301,12 @@ class Watching:
                 interval95=(value - half, value + half),
                 unit=slopes[k].unit,
                 text=estimate(value, sigma, slopes[k].unit).text,
-                since=self._since(change.k, one.low, one.high),
+                since=_since(runs, change.k, one.low, one.high),
                 evidence=f"e-value {e_value_text(e_value)}, {alarm_from}",
                 e_value=e_value,
-                first_run=self.ordered[one.first_look - 1].number,
+                first_run=runs[one.first_look - 1].number,
                 aliases=others,
             )
-
-    def _since(self, at: int, low: int, high: int) -> Since:
-        run, first, last = (self.ordered[k] for k in (at, low, high))
-        return Since(run.number, run.run.files[0], run.run.date, first.number, last.number,
-                     first.run.date, last.run.date)  # fmt: skip
 
     def _conventions(self) -> Iterator[Alarm]:
         """Conventions and slips that were undone in some runs and not in the first."""
@@ -344,17 +318,21 @@ class Watching:
                 if not n.undone or key in known:
                     continue
                 known.add(key)
+                since = _since(self.ordered, at, at, at)
                 yield Alarm(n.effect, n.sensor, n.stage, "convention", None, None, None, "",
-                            n.words, self._since(at, at, at), "undone before anything was fitted",
-                            None, entry.number, (), words=n.words)  # fmt: skip
+                            n.words, since, "undone before anything was fitted", None,
+                            entry.number, (), words=n.words)  # fmt: skip
 
     def _runs(self) -> Iterator[WatchedRun]:
         """Every run of every baseline, with what it tells alone beside what is named."""
         place = {e.number: k for k, e in enumerate(self.ordered)}
-        values = run_values(self.changes, [one.change for one in self.seen], RATE)
+        looks = {e.number: k for k, e in enumerate(self.rest.runs)}
+        seen = [replace(one.change, k=place[self.rest.runs[one.change.k].number])
+                for one in self.rest.seen]  # fmt: skip
+        values = run_values(self.every.changes, seen, RATE, self.alone)
         for entry in self.stored.entries:
-            k = place.get(entry.number)
-            known = None if k is None or k == 0 else self.course[k - 1]
+            k, look = place.get(entry.number), looks.get(entry.number)
+            known = None if not look else self.rest.evidence[look - 1]
             yield WatchedRun(
                 run=entry.number,
                 files=entry.run.files,
@@ -366,8 +344,9 @@ class Watching:
                 baseline=1 + sum(after < entry.number for after in self.stored.baselines),
                 e_value=None if known is None else math.exp(min(known, 690.0)),
                 new=entry.number > self.before,
-                left_out=True if entry.number in self.stored.left_out else None,
                 values=() if k is None else tuple(map(self._told, values[k])),
+                left_out=True if entry.number in self.stored.left_out else None,
+                checks=entry.run.checks or None,
             )
 
     def _told(self, one: RunParameter) -> RunValue:
@@ -383,24 +362,7 @@ class Watching:
         )
 
 
-def _best(changes: Changes, look: int, table: Array, first: int, total: float) -> Seen:
-    """The likeliest change; among effects that are as good, the commonest in practice."""
-    each = np.logaddexp.reduce(table, axis=0)
-    close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
-    c = min(close, key=lambda i: (commonness(changes.terms[i].label), -each[i]))
-    share = np.exp(table[:, c] - each[c])
-    k = int(np.argmax(share)) + 1
-    order = np.argsort(-share)
-    needed = int(np.searchsorted(np.cumsum(share[order]), CREDIBLE)) + 1
-    credible = order[:needed] + 1
-    others = sorted(
-        ((changes.terms[i], float(each[c] - each[i])) for i in range(len(each))
-         if i != c and each[i] > each[c] - RIVAL_NATS),
-        key=lambda other: other[1],
-    )  # fmt: skip
-    return Seen(changes.change(look, k, int(c)), int(min(credible)), int(max(credible)), first,
-                total, tuple(others))  # fmt: skip
-
-
-def _look(key: str, evidence: float, within: Array, between: Array) -> KeptLook:
-    return KeptLook(key, evidence, tuple(map(float, within)), tuple(map(float, between)))
+def _since(runs: Sequence[Entry], at: int, low: int, high: int) -> Since:
+    run, first, last = (runs[k] for k in (at, low, high))
+    return Since(run.number, run.run.files[0], run.run.date, first.number, last.number,
+                 first.run.date, last.run.date)  # fmt: skip

@@ -63,6 +63,11 @@ def _shown(parameters: Mapping[str, Estimate]) -> dict[str, str]:
     return {name: one.text for name, one in parameters.items()} | format_components(seen)
 
 
+def in_words(effect: Effect, sensor: str, parameters: Mapping[str, Estimate]) -> str:
+    """An effect in one sentence, without its capital."""
+    return effect.in_words(WORDS[sensor], _shown(parameters))
+
+
 def finding(
     effect: Effect,
     sensor: str,
@@ -76,7 +81,7 @@ def finding(
     size_m: float | None = None,
 ) -> Finding:
     """A missing effect in words; rivals: aliases, lookalikes, excluded."""
-    text = effect.in_words(WORDS[sensor], _shown(parameters))
+    text = in_words(effect, sensor, parameters)
     return Finding(
         effect.name,
         sensor,

@@ -69,7 +69,7 @@ class Judged:
         for covariance, count in self.jackknives:
             own = count - size
             share = _square(values, covariance[seen][:, seen]) * own / (size * (count - 1))
-            found = max(found, _log_f(share, size, own))
+            found = max(found, log_f(share, size, own))
         return found
 
 
@@ -78,7 +78,7 @@ def _log_chi2(square: float, freedom: int) -> float:
     return _log(float(gammaincc(0.5 * freedom, 0.5 * square)))
 
 
-def _log_f(share: float, first: int, second: int) -> float:
+def log_f(share: float, first: int, second: int) -> float:
     """log of the upper tail of Fisher's F, by the incomplete beta function."""
     return _log(float(betainc(0.5 * second, 0.5 * first, second / (second + first * share))))
 
@@ -113,5 +113,5 @@ def course_of(own: Array, weight: Array) -> Course:
     whole = float(np.sum(total * means) / np.sum(total))
     between = float(np.sum(total * (means - whole) ** 2)) / (QUARTERS - 1)
     inside = float(np.sum(weight * (own - means[groups]) ** 2)) / (own.shape[0] - QUARTERS)
-    log_p = _log_f(between / max(inside, 1e-300), QUARTERS - 1, own.shape[0] - QUARTERS)
+    log_p = log_f(between / max(inside, 1e-300), QUARTERS - 1, own.shape[0] - QUARTERS)
     return Course(tuple(float(v) for v in means), log_p)

@@ -244,12 +244,7 @@ def rival_text(one: Rival, *, alike: bool = False) -> str:
 
 def _parameter_text(shown: Estimate) -> str:
     """`87.1 \u00b1 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
-    if not shown.seen:
-        return "not seen in this log"
-    if isinstance(shown.value, str):
-        return shown.value
-    spread = numbers.finite(shown.standard_uncertainty)
-    return numbers.with_uncertainty(shown.value, spread, shown.unit)
+    return shown.text if shown.seen else "not seen in this log"
 
 
 def regime_text(one: Regime) -> str:

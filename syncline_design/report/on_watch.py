@@ -7,7 +7,7 @@ from functools import partial
 from typing import Final
 
 from syncline_design.campaign.watch_result import Alarm, Watch, WatchedRun, e_value_text
-from syncline_design.diagnosis.result import BlindSpot
+from syncline_design.diagnosis.result import BlindSpot, UnlikeOthers
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
@@ -40,6 +40,8 @@ from syncline_design.report.table import Cell
 from syncline_design.report.text import visible
 
 MOST_RUNS: Final = 10  # told outside the page
+MOST_NAMED: Final = 2  # effects in the headline
+PLATFORM: Final = ("speed", "turn_rate", "range")  # checks against the spec's platform
 FEWEST_RUNS: Final = 3  # of two that differ, neither says what is usual between runs
 
 
@@ -77,6 +79,8 @@ def on_watch(found: Watch) -> Document:
 
 def _outcome(found: Watch) -> Outcome:
     looks = _looks(found)
+    if not found.alarms and (found.contradicted or found.unlike):
+        return Outcome("warn", "?", f"Nothing seen to change, but {_odd_one(found)}")
     if not found.alarms and looks < FEWEST_RUNS:
         return Outcome("warn", "?", f"Too few runs to tell ({looks} of {FEWEST_RUNS})")
     if not found.alarms and _shows_no_delay(found):
@@ -85,8 +89,36 @@ def _outcome(found: Watch) -> Outcome:
     if not found.alarms:
         return Outcome("good", "\u2713", f"Nothing changed in {looks} run{'s'[: looks != 1]}")
     first = found.alarms[0]
+    lone = list(dict.fromkeys(str(one.since.run) for one in found.alarms if one.alone))
+    if len(lone) > 1:
+        return Outcome("bad", "!", f"Runs {sentence_list(lone)} are unlike the others")
+    own = [one for one in found.unlike or () if one.number == first.since.run]
+    beyond = first.since.run in [run.run for run in found.contradicted]
+    if first.alone or len(own) > 1 or (own and beyond):
+        names = sentence_list([_name(one) for one in own[:MOST_NAMED]])
+        more = f" and {len(own) - MOST_NAMED} more" if len(own) > MOST_NAMED else ""
+        also = f"{_contradiction(found, first.since.run)} and " if beyond else ""
+        words = f"Run {first.since.run} {also}is unlike the others: {names}{more}"
+        return Outcome("bad", "!", words)
     when = first.since.date or f"run {first.since.run}"
     return Outcome("bad", "!", f"Changed: {_name(first)}, since {when}")
+
+
+def _odd_one(found: Watch) -> str:
+    """`run 5 is unlike the others`: which run does not belong there, in a few words."""
+    if found.contradicted:
+        run = found.contradicted[-1].run
+        return f"run {run} {_contradiction(found, run)}"
+    numbers_of = list(dict.fromkeys(str(one.number) for one in found.unlike or ()))
+    if len(numbers_of) == 1:
+        return f"run {numbers_of[0]} is unlike the others"
+    return f"runs {sentence_list(numbers_of)} are unlike the others"
+
+
+def _contradiction(found: Watch, number: int) -> str:
+    run = next(run for run in found.contradicted if run.run == number)
+    beyond = any(check.code in PLATFORM for check in run.checks or ())
+    return "is beyond the platform's limits" if beyond else "contradicts itself"
 
 
 def _looks(found: Watch) -> int:
@@ -94,7 +126,7 @@ def _looks(found: Watch) -> int:
     return len([r for r in found.runs if r.run > found.baseline_after and not r.left_out])
 
 
-def _name(one: Alarm | BlindSpot) -> str:
+def _name(one: Alarm | BlindSpot | UnlikeOthers) -> str:
     return f"{one.effect.replace('_', ' ')} ({one.sensor})"
 
 
@@ -102,8 +134,11 @@ def _sentences(found: Watch) -> Iterator[Inline]:
     for one in found.alarms:
         yield _sentence(one)
     if found.alarms:
+        lone = next((one.since.run for one in found.alarms if one.alone), None)
+        out = f"watch STORE --leave-out {lone} --reason TEXT"
         yield (
             "The alarm stays until ",
+            *([code(out), " counts the run no more, or "] if lone is not None else ()),
             code("watch STORE --accept"),
             " makes a new baseline: after a repair, or where the change is meant to stay.",
         )
@@ -143,15 +178,16 @@ def _sentence(one: Alarm) -> str:
     place = f"run {one.since.run} ({one.since.file}{dated})"
     if one.words is not None:
         return f"Since {place}: {one.words}."
+    name = _name(one)
+    name = name[0].upper() + name[1:]
+    if one.alone:
+        return f"{name}: {_parameter(one)} differs by {one.text} in {place} alone."
     near = ""
     if one.since.low != one.since.high:
         first, last = one.since.low_date, one.since.high_date
         ends = f"{first} to {last}" if first and last else f"{one.since.low} to {one.since.high}"
         near = f", with 95 % one of the runs {ends}"
-    name = _name(one)
-    return (
-        f"{name[0].upper()}{name[1:]}: {_parameter(one)} changed by {one.text} with {place}{near}."
-    )
+    return f"{name}: {_parameter(one)} changed by {one.text} with {place}{near}."
 
 
 def _parameter(one: Alarm) -> str:
@@ -173,12 +209,15 @@ def _alarms(found: Watch) -> list[Node]:
 
 
 def _alarm(one: Alarm) -> Node:
-    facts: list[tuple[str, str]] = [(f"Change of {_parameter(one)}", one.text)]
+    what = "Departure" if one.alone else "Change"
+    facts: list[tuple[str, str]] = [(f"{what} of {_parameter(one)}", one.text)]
     if one.interval95 is not None:
         low, high = (numbers.si_quantity(end, one.unit, 3) for end in one.interval95)
         facts.append(("95 % interval", f"{low} to {high}"))
     since = f"run {one.since.run}, {one.since.file}"
-    facts.append(("Since", since + (f", {one.since.date}" if one.since.date else "")))
+    facts.append(
+        ("In" if one.alone else "Since", since + (f", {one.since.date}" if one.since.date else ""))
+    )
     nodes: list[Node] = [
         Heading(given(one.effect.replace("_", " ")), given(f"{one.sensor}, {one.stage}")),
         Text(_sentence(one), reach="page"),
@@ -276,9 +315,15 @@ def _rests(found: Watch) -> list[Node]:
         if found.ordered_by == "date"
         else "in the order of adding, as not every log's timeline is known"
     )
+    told = (
+        f"Runs that are unlike all the others are looked for besides, with a chance of "
+        f"{numbers.percent(found.unlike_rate)} over all looks that one of alike runs is said to be."
+        if found.unlike_rate else ""
+    )  # fmt: skip
     return [
         Items((
             f"{found.rule.method}: at most {rate} while nothing changes.",
+            *([told] if told else []),
             f"Runs are compared {order}.",
             ("Kept in ", code(found.store), ", whose lines are chained by their hashes; hash of "
              "the last line ", code(found.last[:16]), ". Whoever writes the whole chain anew is "

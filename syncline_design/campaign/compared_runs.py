@@ -1,0 +1,219 @@
+"""Runs in their order with what was found at every look at them: whether it rang, and by what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.changes import Change, Changes
+from syncline_design.campaign.looks import KeptLook, keys_of, known_first
+from syncline_design.campaign.pool import Pool, Term, inverted, pool_of
+from syncline_design.campaign.store import Entry, Stored, by_date
+from syncline_design.diagnosis.candidates import commonness
+from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
+
+AS_GOOD_NATS: Final = 2.0
+RIVAL_NATS: Final = 3.0
+MOST_CHANGES: Final = 4
+CREDIBLE: Final = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A change that was seen: the best, at which look first, how sure, what else it could be."""
+
+    change: Change
+    low: int
+    high: int
+    first_look: int
+    log_evidence: float
+    others: tuple[tuple[Term, float], ...]
+
+    def grown(self, values: Array) -> Seen:
+        """The same, by so much larger."""
+        return replace(self, change=replace(self.change, values=self.change.values + values))
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedRuns:
+    """Runs of one baseline, in the order in which they are compared; threshold: log of the evidence
+    [nat] that rings."""
+
+    stored: Stored
+    runs: tuple[Entry, ...]
+    threshold: float
+
+    @cached_property
+    def pool(self) -> Pool:
+        entries = self.runs or self.stored.entries[-1:]
+        return pool_of([e.found for e in entries], [e.start for e in entries])
+
+    @property
+    def evidence(self) -> Array:
+        """log E_n after each look, from the second run on."""
+        return self.changes.course[1:]
+
+    @cached_property
+    def keys(self) -> tuple[str, ...]:
+        """Of the look after each run."""
+        return self._keys(self.runs)
+
+    def _keys(self, runs: Sequence[Entry]) -> tuple[str, ...]:
+        listed = [self.pool.labels, [term.label for term in self.pool.terms]]
+        return tuple(keys_of(listed, [entry.line for entry in runs]))
+
+    @cached_property
+    def kept(self) -> tuple[KeptLook, ...]:
+        """What earlier looks at these runs found, as the store holds it."""
+        return known_first(self.stored.looks, self.keys, len(self.pool.terms))
+
+    @cached_property
+    def doubted(self) -> int | None:
+        """The run after which a kept look says what its runs do not; None where none does.
+
+        At every call another of them is computed again.
+        """
+        if not self.kept:
+            return None
+        at = len(self.stored.entries) % len(self.kept)
+        anew = _look(self.keys[at], *Changes(self.pool, self.kept).found_anew(at + 1))
+        return None if anew.is_like(self.kept[at]) else at
+
+    @cached_property
+    def changes(self) -> Changes:
+        return Changes(self.pool, self.kept if self.doubted is None else ())
+
+    @cached_property
+    def fresh(self) -> tuple[KeptLook, ...]:
+        """Looks that the store does not hold, or holds wrongly."""
+        first = len(self.kept) if self.doubted is None else 0
+        places = range(first, len(self.runs))
+        return tuple(_look(self.keys[k], *self.changes.found_by(k + 1)) for k in places)
+
+    @cached_property
+    def first_look(self) -> int | None:
+        """The first look that rang, by the place from 1 of its run; None where none did."""
+        rang = (k + 2 for k, e in enumerate(self.evidence) if e >= self.threshold)
+        return next(rang, self._rang)
+
+    @cached_property
+    def seen(self) -> tuple[Seen, ...]:
+        """Changes that were alarmed at any look so far, the strongest first."""
+        first = self.first_look
+        if first is None:
+            return ()
+        found: list[Seen] = []
+        changes, look = self.changes, len(self.runs)
+        for _ in range(2 * MOST_CHANGES):
+            at = look
+            total, table = changes.log_evidence(at)
+            if found and (total < self.threshold or len(found) == MOST_CHANGES):
+                break
+            if not found and total < math.log(2.0):  # it went back, which is a change of its own
+                at = first
+                total, table = changes.log_evidence(at)
+            one = _best(changes, at, table, first, total)
+            changes = changes.without(one.change)
+            same = [k for k, other in enumerate(found) if other.change.is_of(one.change)]
+            for k in same:  # what was left of one that is told already
+                found[k] = found[k].grown(one.change.values)
+            if not same:
+                found.append(one)
+        return _at_once(found, changes, look, self.threshold)
+
+    @property
+    def _rang(self) -> int | None:
+        """The place from 1 of the run whose look rang when it was added, before runs of earlier
+        dates came in; an alarm stays, whatever is added."""
+        if self.doubted is not None:
+            return None
+        added = sorted(self.runs, key=lambda entry: entry.number)
+        begun = [entry.run.first_s for entry in added]
+        if begun == sorted(begun):  # nothing came in late: the course is what the looks found
+            return None
+        for n in range(2, len(added)):
+            look = self.stored.looks.get(self._keys(tuple(by_date(tuple(added[:n]))))[-1])
+            if look is not None and look.log_evidence >= self.threshold:
+                return 1 + self.runs.index(added[n - 1])
+        return None
+
+
+def _at_once(
+    found: Sequence[Seen], without: Changes, look: int, threshold: float
+) -> tuple[Seen, ...]:
+    """Several changes fitted together, less those that only stood for what others had left.
+
+    without: runs less all of them, so that none makes the scatter that another is held against.
+    """
+    kept = list(found)
+    while len(kept) > 1:
+        left = _fitted_together(without, [one.change for one in kept], look)
+        changes = [replace(own, values=one.change.values + own.values)
+                   for one, own in zip(kept, left, strict=True)]  # fmt: skip
+        weakest = min(range(len(changes)), key=lambda k: _explained(changes[k]))
+        if _explained(changes[weakest]) >= threshold:
+            pairs = zip(kept, changes, strict=True)
+            return tuple(replace(one, change=change) for one, change in pairs)
+        gone = kept.pop(weakest).change
+        without = without.without(replace(gone, values=-gone.values))
+    return tuple(kept)
+
+
+def _explained(change: Change) -> float:
+    """d' C^-1 d / 2 [nat] of a change."""
+    return 0.5 * float(change.values @ inverted(change.covariance) @ change.values)
+
+
+def _fitted_together(changes: Changes, ones: Sequence[Change], look: int) -> list[Change]:
+    """Several changes fitted at once to the first `look` runs.
+
+    With T_i the information of the runs from k_i on and J_i = T_i[c_i, :],
+        N_ij = T_max(i, j)[c_i, c_j] - J_i S^-1 J_j',   s_i = g_i[c_i] - J_i S^-1 g.
+    """
+    runs, temper = changes.compared(look), changes.temper(look)
+    later = [runs.normal[one.k :].sum(axis=0) for one in ones]
+    index = [one.term.index for one in ones]
+    across = np.concatenate([t[own] for t, own in zip(later, index, strict=True)])
+    scores = np.concatenate([runs.score[one.k :].sum(axis=0)[own]
+                             for one, own in zip(ones, index, strict=True)])  # fmt: skip
+    both = [[later[i if ones[i].k >= ones[j].k else j][np.ix_(index[i], index[j])]
+             for j in range(len(ones))] for i in range(len(ones))]  # fmt: skip
+    inverse = inverted(np.block(both) - across @ runs.inverse @ across.T)
+    values = inverse @ (scores - across @ (runs.inverse @ runs.score.sum(axis=0)))
+    place = {term.label: k for k, term in enumerate(changes.terms)}
+    found, end = [], 0
+    for one in ones:
+        at = slice(end, end + one.term.size)
+        end += one.term.size
+        factor = float(temper[one.k - 1, place[one.term.label]])
+        found.append(replace(one, values=values[at], covariance=factor * inverse[at, at]))
+    return found
+
+
+def _best(changes: Changes, look: int, table: Array, first: int, total: float) -> Seen:
+    """The likeliest change; among effects that are as good, the commonest in practice."""
+    each = np.logaddexp.reduce(table, axis=0)
+    close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
+    c = min(close, key=lambda i: (commonness(changes.terms[i].label), -each[i]))
+    share = np.exp(table[:, c] - each[c])
+    k = int(np.argmax(share)) + 1
+    order = np.argsort(-share)
+    needed = int(np.searchsorted(np.cumsum(share[order]), CREDIBLE)) + 1
+    credible = order[:needed] + 1
+    others = sorted(
+        ((changes.terms[i], float(each[c] - each[i])) for i in range(len(each))
+         if i != c and each[i] > each[c] - RIVAL_NATS),
+        key=lambda other: other[1],
+    )  # fmt: skip
+    return Seen(changes.change(look, k, int(c)), int(min(credible)), int(max(credible)), first,
+                total, tuple(others))  # fmt: skip
+
+
+def _look(key: str, evidence: float, within: Array, between: Array) -> KeptLook:
+    return KeptLook(key, evidence, tuple(map(float, within)), tuple(map(float, between)))

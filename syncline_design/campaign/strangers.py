@@ -1,0 +1,254 @@
+"""Runs of a store that are unlike all the others: another vehicle's log, or one odd day.
+
+A run r is held against all the others.  With I_r, g_r its information and score, S the sum of all
+information, of the others with what is known of the constants, and g that of all scores,
+    W = I_r - I_r S^-1 I_r,   u = g_r - I_r S^-1 g
+are information and score of what is another in this run alone; of effects C
+    d = W_CC^-1 u_C,   u_C' W_CC^-1 u_C ~ chi-square where nothing is,
+over the scatter inside runs and that between the others.  What differs from run to run anyway is
+freed, and Fisher's F of as many free values as the others have takes the place of chi-square then.
+Two that are strange alike hide each other, so that the oddest are held against the others without
+one another, too.  A run is a stranger where the chance of that, times runs and effects
+(Bonferroni), is below its look's share of `RATE`: 2 / (n (n - 1)) after n runs, so that the chance
+of a false word is at most `RATE` over all looks (docs/joint.md has what was counted).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.changes import Changes, pseudo_inverse
+from syncline_design.campaign.pool import Index, Term, inverted
+from syncline_design.campaign.scatter import freed_of
+from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.judged import Judged, log_f
+from syncline_design.diagnosis.scores import log_p_of
+from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
+
+RATE: Final = 0.01  # chance that any of several alike runs is said to be unlike, over all looks
+FEWEST: Final = 3  # runs: of two that differ neither is the odd one
+MOST_TOLD: Final = 4  # effects of one run
+MOST_TRIED: Final = 4  # runs that seem odd before the scatter of the others is known
+PAIRED: Final = 3  # of them, of which two are looked at together
+FEWEST_OF_PAIRS: Final = 6  # runs
+AS_GOOD_NATS: Final = 2.0
+ALIKE_SPREADS: Final = 5.0  # standard uncertainties within which two strange runs are alike
+
+
+def share_of(look: int) -> float:
+    """Share of the false words that a look may have: 2 / (n (n - 1)), which sums to 1 from 3 on."""
+    return 2.0 / (look * (look - 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Departure:
+    """One effect by which a run differs from the others: by how much, and log of the chance."""
+
+    term: Term
+    judged: Judged
+    log_p: float
+
+
+@dataclass(frozen=True, eq=False)
+class Stranger:
+    """A run, by its place, with all in which it is unlike the others, the clearest first."""
+
+    run: int
+    departures: tuple[Departure, ...]
+
+    def is_like(self, other: Stranger) -> bool:
+        """Whether both differ from the rest by as much in what is clearest of either."""
+        return self._shares(other) or other._shares(self)
+
+    def _shares(self, other: Stranger) -> bool:
+        first = self.departures[0]
+        same = [d for d in other.departures if d.term.label == first.term.label]
+        if not same:
+            return False
+        off = np.abs(first.judged.values - same[0].judged.values)
+        spread = np.hypot(first.judged.spread, same[0].judged.spread)
+        return bool(np.all(off <= ALIKE_SPREADS * spread))
+
+
+def strangers(changes: Changes) -> tuple[Stranger, ...]:
+    """All runs that are unlike the others, by their places; none where half of them would be."""
+    rows = np.arange(changes.pool.count)
+    limit = math.log(RATE * share_of(max(changes.pool.count, 2)))
+    found: list[Stranger] = []
+    while len(rows) >= FEWEST:
+        one = _strangest(part_of(changes, rows), limit)
+        if one is None:
+            break
+        found.append(replace(one, run=int(rows[one.run])))
+        rows = np.delete(rows, one.run)
+        if 2 * len(found) >= changes.pool.count:
+            return ()
+    odd = [one.run for one in found]
+    return tuple(_anew(changes, one, odd, limit) for one in sorted(found, key=lambda o: o.run))
+
+
+def _anew(changes: Changes, one: Stranger, odd: Sequence[int], limit: float) -> Stranger:
+    """A strange run with all its departures, none of which another strange one hides."""
+    rows = np.array([k for k in range(changes.pool.count) if k == one.run or k not in odd])
+    at = int(np.flatnonzero(rows == one.run)[0])
+    found = tuple(_held(part_of(changes, rows), at, ()).departures(limit))
+    return replace(one, departures=found or one.departures)
+
+
+def standing_alone(strange: Sequence[Stranger], count: int) -> tuple[int, ...]:
+    """Places, of `count` runs, of those that none beside them is like: what began with a run and
+    lasts, or was over with the second one, is a change."""
+    known = {one.run: one for one in strange}
+    return tuple(
+        k for k, one in known.items()
+        if 0 < k < count - 1
+        and not any(one.is_like(known[b]) for b in (k - 1, k + 1) if b in known)
+    )  # fmt: skip
+
+
+def part_of(changes: Changes, rows: Index) -> Changes:
+    """The same question of some of the runs."""
+    found = Changes(changes.pool.part(rows))
+    told = {term.label for term in found.terms}  # what no other run tells of is no question more
+    stays = np.flatnonzero([term.label in told for term in changes.terms])
+    found.__dict__["within"] = changes.within[np.ix_(rows, stays)]
+    return found
+
+
+def _strangest(changes: Changes, limit: float) -> Stranger | None:
+    """The run that is least like the others; None where noise would do."""
+    count, seems = changes.pool.count, _seem(changes)
+    odd = [int(run) for run in np.argsort(seems)[:MOST_TRIED] if seems[run] < limit]
+    tries: list[tuple[int, tuple[int, ...]]] = [(run, ()) for run in odd]
+    if count >= FEWEST_OF_PAIRS:  # two that are strange alike hide each other
+        tries += [(run, (other,)) for run in odd[:PAIRED] for other in odd[:PAIRED] if other != run]
+    for run, apart in tries:
+        found = tuple(_held(changes, run, apart).departures(limit))
+        if found:
+            return Stranger(run, found)
+    return None
+
+
+def _seem(changes: Changes) -> Array:
+    """log of the least chance of any effect by run, (L,), as if nothing scattered."""
+    known = changes.pool
+    count = known.count
+    inverse = pseudo_inverse(changes.total(count, known.normal, known.score))
+    apart = known.normal - known.normal @ inverse @ known.normal
+    left = known.score - known.normal @ (inverse @ known.score.sum(axis=0))
+    found = np.zeros(count)
+    for group in changes.groups:
+        own, score = apart[:, *group.blocks], left[:, group.index]
+        squares = np.einsum("lga,lgab,lgb->lg", score, inverted(own), score)
+        free = np.sum(np.einsum("lgaa->lga", own) > 0.0, axis=-1)
+        for run in range(count):
+            for size in np.unique(free[run][free[run] > 0]):
+                most = float(np.max(squares[run][free[run] == size]))
+                found[run] = min(found[run], log_p_of(most, int(size)))
+    return np.asarray(found + math.log(count * max(len(changes.terms), 1)))
+
+
+def _held(changes: Changes, run: int, apart: tuple[int, ...]) -> Odd:
+    """A run against the others but for those apart, what scatters among those freed in it, too."""
+    rest = np.delete(np.arange(changes.pool.count), [run, *apart])
+    others = part_of(changes, rest)
+    runs = others.compared(len(rest))
+    normal, score = changes.pool.normal[run][None], changes.pool.score[run][None]
+    for one in runs.freed:
+        normal, score = freed_of(normal, score, one.term.index, one.covariance)
+    inverse = pseudo_inverse(runs.total + normal[0])
+    fit = inverse @ (runs.score.sum(axis=0) + score[0])
+    between = {t.label: 1.0 for t in changes.terms}
+    for group, scatter in zip(others.groups, runs.scatters, strict=True):
+        for k, factor in zip(group.terms, scatter.factor[-1], strict=True):
+            between[others.terms[int(k)].label] = float(factor)
+    inside = np.maximum(changes.inside(changes.pool.count), changes.within[run])
+    temper = inside * np.array([between[t.label] for t in changes.terms])
+    tries = changes.pool.count ** (1 + len(apart))
+    return Odd(changes, normal[0] - normal[0] @ inverse @ normal[0], score[0] - normal[0] @ fit,
+               temper, tries, len(rest) - 1 if runs.freed else None)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Odd:
+    """What is another in one run alone: information W (P, P), score u (P,); temper: variance of
+    each effect over that fitted, (C,).  tries: runs, or pairs of them, that were tried.  known:
+    free values by which the scatter of the others is known, where it was freed."""
+
+    changes: Changes
+    normal: Array
+    score: Array
+    temper: Array
+    tries: int
+    known: int | None = None
+
+    @cached_property
+    def charge(self) -> float:
+        """log of how often chance was given a try."""
+        return math.log(self.tries * max(len(self.changes.terms), 1))
+
+    def log_p(self, k: int, beside: Sequence[int]) -> float:
+        """log of the chance of one effect's departure beside those of others."""
+        index = self.changes.terms[k].index
+        free = int(np.sum(np.diag(self.normal)[index] > 0.0))
+        more = self.square((*beside, k)) - self.square(beside)
+        if not free:
+            return 0.0
+        square = max(more, 0.0) / float(self.temper[k])
+        if self.known is not None:
+            return log_f(square / free, free, self.known) + self.charge
+        return log_p_of(square, free) + self.charge
+
+    def square(self, taken: Sequence[int]) -> float:
+        """u' W^-1 u of some effects."""
+        index = self._index(taken)
+        if not index.size:
+            return 0.0
+        own = self.score[index]
+        return float(own @ inverted(self.normal[np.ix_(index, index)]) @ own)
+
+    def _index(self, taken: Sequence[int]) -> Index:
+        none = np.zeros(0, dtype=np.int64)
+        return np.concatenate([none, *(self.changes.terms[k].index for k in taken)])
+
+    def departures(self, limit: float) -> Iterator[Departure]:
+        """The effects that differ, forward, of those that explain as much the commonest."""
+        taken: list[int] = []
+        while len(taken) < MOST_TOLD:
+            one = self._next(taken, limit)
+            if one is None:
+                break
+            taken.append(one)
+        stay = [k for k in taken if self.log_p(k, [b for b in taken if b != k]) < limit]
+        index = self._index(stay)
+        covariance = inverted(self.normal[np.ix_(index, index)])
+        values, at = covariance @ self.score[index], 0
+        for k in stay:
+            term = self.changes.terms[k]
+            own = slice(at, at + term.size)
+            at += term.size
+            judged = Judged(values[own], float(self.temper[k]) * covariance[own, own])
+            yield Departure(term, judged, self.log_p(k, [b for b in stay if b != k]))
+
+    def _next(self, taken: Sequence[int], limit: float) -> int | None:
+        chances = {k: self.log_p(k, taken) for k in range(len(self.changes.terms))
+                   if k not in taken}  # fmt: skip
+        odd = [k for k, chance in chances.items() if chance < limit]
+        if not odd:
+            return None
+        gains = {k: self._gain(k, taken) for k in odd}
+        most = max(gains.values())
+        close = [k for k in odd if gains[k] >= most - AS_GOOD_NATS]
+        return min(close, key=lambda k: (commonness(self.changes.terms[k].label), chances[k]))
+
+    def _gain(self, k: int, taken: Sequence[int]) -> float:
+        """What an effect explains, less its freedom [nat]."""
+        more = self.square((*taken, k)) - self.square(taken)
+        return 0.5 * more / float(self.temper[k]) - self.changes.terms[k].size

@@ -1,0 +1,215 @@
+"""Runs of a store that are unlike the others: named with figures, and hiding no change.
+
+Oracles: the values the runs were made with, and counting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.campaign.adding import run_of as run_of_log
+from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.compared_runs import ComparedRuns
+from syncline_design.campaign.kept import Run
+from syncline_design.campaign.pool import pool_of
+from syncline_design.campaign.store import Entry, Stored, add_run
+from syncline_design.campaign.strangers import standing_alone, strangers
+from syncline_design.diagnosis.result import Check
+from syncline_design.diagnosis.settings import DiagnosisSettings
+from syncline_design.diagnosis.system import pinned_system
+from syncline_design.spec.load import load
+from tests.watched_series import BOUND, LABELS, car_spec, kept, run_of, statistics, told, watch
+from tests.world import make_log, scenario
+
+OTHER = np.array([20.0, 10.0, 0, 0, 0]) * BOUND  # another vehicle's latency and range bias
+FAST = Check("speed", "car", "contradiction", "speed of car reaches 31 m/s (95 % of the log is "
+             "below), the spec's v_max is 15 m/s; 60 % of the log is beyond it", 31.0, 15.0, "m/s",
+             0.6)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return car_spec(tmp_path_factory.mktemp("strangers") / "spec.yaml")
+
+
+def with_odd(seed: int, count: int, odd: int, off: np.ndarray = OTHER) -> list[Run]:
+    """Alike runs but one."""
+    rng = np.random.default_rng(seed)
+    base = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+    return [run_of(statistics(rng, base + off * (k == odd)), k) for k in range(count)]
+
+
+@pytest.mark.parametrize("size", [1.0, 20.0])
+def test_another_vehicles_log_is_named_with_all_that_differs(
+    spec: Path, tmp_path: Path, size: float
+) -> None:
+    """Whether it differs by 20 bounds or by 400: what differs so makes no effect one that differs
+    from run to run, and 95 % intervals hold what it was made with."""
+    store = kept(spec, tmp_path, with_odd(5, 12, 4, size * OTHER))
+    found = told(spec, store, tmp_path, 1)
+    assert {one["number"] for one in found["unlike"]} == {5}
+    differs = {one["effect"]: one["differs"] for one in found["unlike"]}
+    assert set(differs) == {"latency", "range_bias"}
+    for (effect, name), true in zip(
+        (("latency", "latency_s"), ("range_bias", "bias_m")), size * OTHER[:2], strict=True
+    ):
+        own = differs[effect][name]
+        assert abs(own["value"] - true) < 3.5 * own["standard_uncertainty"]
+        assert 0.7 < own["standard_uncertainty"] / BOUND[0 if effect == "latency" else 1] < 1.6
+    assert not any("another value in every run" in one for one in found["cautions"])
+    (said,) = [one for one in found["cautions"] if "unlike the others" in one]
+    assert said.startswith("run 5 (day4.csv) is unlike the others: latency (position) by ")
+    assert "--leave-out 5" in said
+    page = (tmp_path / "watch.html").read_text("utf-8")
+    assert "Run 5 is unlike the others: latency (position) and range bias (ranging)" in page
+
+
+def test_a_run_that_rang_alone_rings_until_it_is_left_out(spec: Path, tmp_path: Path) -> None:
+    """On its day as a change, with the next run as that run's own; left out, nothing changed."""
+    runs = with_odd(6, 10, 7)
+    store = kept(spec, tmp_path, runs[:8])
+    found = told(spec, store, tmp_path, 1)
+    assert {one["since"]["run"] for one in found["alarms"]} == {8}
+    assert any("run 8" in one and "a change since then" in one for one in found["cautions"])
+    assert "Run 8 is unlike the others" in watch(store, spec).output
+    for run in runs[8:]:
+        add_run(store, "car", pinned_system(load(spec)), run)
+        found = told(spec, store, tmp_path, 1)
+        assert {(one["since"]["run"], one.get("alone")) for one in found["alarms"]} == {(8, True)}
+        assert found["e_value"] < 20.0
+    assert "--leave-out 8" in " ".join(watch(store, spec).output.split())
+    assert watch(store, "--leave-out", "8", "--reason", "another vehicle").exit_code == 0
+    found = told(spec, store, tmp_path, 0)
+    assert "unlike" not in found
+
+
+def test_a_strange_run_hides_no_later_change(spec: Path, tmp_path: Path) -> None:
+    """Nine bounds from the tenth run on, after a run that is off by four hundred."""
+    runs = with_odd(7, 9, 3, 20.0 * OTHER)
+    rng = np.random.default_rng(7)
+    base = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+    moved = base + np.array([9.0, 0, 0, 0, 0]) * BOUND
+    rng = np.random.default_rng(70)
+    runs += [run_of(statistics(rng, moved), k) for k in range(9, 13)]
+    found = told(spec, kept(spec, tmp_path, runs), tmp_path, 1)
+    (alarm,) = found["alarms"]
+    assert (alarm["effect"], alarm["since"]["run"], alarm.get("alone")) == ("latency", 10, None)
+    low, high = alarm["interval95"]
+    assert low < 9.0 * BOUND[0] < high
+    assert {one["number"] for one in found["unlike"]} == {4}
+    values = {run["run"]: run["values"] for run in found["runs"]}
+    north = [v["value"] - base[2] for k in range(1, 14) if k != 4 for v in values[k]
+             if v["parameter"] == "north_m"]  # fmt: skip
+    assert np.max(np.abs(north)) < 5.0 * BOUND[2]  # the courses of other effects are not shifted
+
+
+def test_alike_runs_are_seldom_said_to_be_unlike() -> None:
+    """1 % over all looks: of 100 series of 20 looks, more than 5 have a chance of 0.06 %."""
+    said = 0
+    for seed in range(100):
+        rng = np.random.default_rng([8, seed])
+        runs = [statistics(rng, 20.0 * BOUND) for _ in range(22)]
+        said += any(strangers(Changes(pool_of(runs[:n], range(n)))) for n in range(3, 23))
+    assert said <= 5
+
+
+def test_what_lasts_or_differs_in_every_run_makes_no_stranger() -> None:
+    """A change from the middle on, one that was undone after two runs, and a scatter."""
+    rng = np.random.default_rng(9)
+    draws = rng.standard_normal(12)
+    for sizes, alone in (
+        (10.0 * (np.arange(12) >= 6), ()),
+        (10.0 * np.isin(np.arange(12), (4, 5)), ()),
+        (20.0 * np.isin(np.arange(12), (4,)), (4,)),
+        (20.0 * (np.arange(12) == 4) - 20.0 * (np.arange(12) == 5), (4, 5)),
+        (6.0 * draws, ()),
+        (20.0 * (np.arange(12) == 11), ()),
+    ):
+        runs = [statistics(rng, np.array([size, 0, 0, 0, 0]) * BOUND) for size in sizes]
+        found = strangers(Changes(pool_of(runs, range(12))))
+        assert standing_alone(found, 12) == alone
+
+
+def test_several_changes_of_one_day_are_told_once_each_with_their_uncertainty(
+    tmp_path: Path,
+) -> None:
+    """Latency by 40 bounds and the datum's north by -30, columns of cosine 0.6: what one leaves is
+    no change of its own, and (told - true) / uncertainty scatters by one."""
+    off = []
+    for seed in range(40):
+        rng = np.random.default_rng([10, seed])
+        moved = np.array([40.0, 0, -30.0, 0, 0]) * BOUND
+        runs = [run_of(statistics(rng, moved * (k >= 6), 0.6), k) for k in range(9)]
+        entries = tuple(
+            Entry(k + 1, f"#{k + 1}", run, run.statistics(), f"{k:064d}")
+            for k, run in enumerate(runs)
+        )
+        stored = Stored(tmp_path, "car", {}, entries, (), {}, (), 0, "", b"")
+        seen = ComparedRuns(stored, entries, float(np.log(20.0))).seen
+        assert len({(one.change.term.label, one.change.k) for one in seen}) == len(seen)
+        assert {one.change.term.label[0] for one in seen} == {"latency", "datum_offset"}
+        true = {"latency_s": moved[0], "north_m": moved[2]}
+        for one in seen:
+            names = [p.name for p in one.change.term.effect.slopes()]
+            error = one.change.values - [true.get(name, 0.0) for name in names]
+            off += list(error / np.sqrt(np.diag(one.change.covariance)))
+    assert 0.75 < float(np.sqrt(np.mean(np.square(off)))) < 1.2
+
+
+def test_a_run_beyond_the_platforms_limits_is_said_until_it_is_left_out(
+    spec: Path, tmp_path: Path
+) -> None:
+    """With the same effects as all others it is no change, and no all-clear either."""
+    runs = with_odd(11, 6, 2, 0.0 * OTHER)
+    runs[2] = replace(runs[2], checks=(FAST,), left_material=True)
+    store = kept(spec, tmp_path, runs)
+    found = told(spec, store, tmp_path, 0)
+    (said,) = found["cautions"]
+    assert said.startswith(f"run 3 (day2.csv): {FAST.message}")
+    assert "--leave-out 3" in said
+    assert [bool(run.get("checks")) for run in found["runs"]] == [k == 2 for k in range(6)]
+    out = " ".join(watch(store, spec).output.split())
+    assert "? Nothing seen to change, but run 3 is beyond the platform's limits" in out
+    assert watch(store, spec, "--require-informative").exit_code == 3
+    assert watch(store, "--leave-out", "3", "--reason", "a truck's").exit_code == 0
+    assert "beyond the platform's limits" not in watch(store, spec).output
+
+
+def test_a_log_of_a_faster_vehicle_keeps_what_it_exceeds(tmp_path: Path) -> None:
+    """A fixed wing read with the spec of a multirotor: 24 m/s and 110 m, not 9 and 40."""
+    slow, fast = (make_log(scenario(name, 5051, 20.0, 5.0), ())
+                  for name in ("multirotor_lines", "fixed_wing_circuits"))  # fmt: skip
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(slow.spec_yaml(), encoding="utf-8")
+    run = run_of_log(load(spec), [fast.to_csv(tmp_path / "fast.csv")], DiagnosisSettings())
+    assert {check.code for check in run.checks or ()} == {"speed", "range"}
+    assert all(check.value > check.limit for check in run.checks or ())
+
+
+@pytest.mark.parametrize(("bare", "said"), [((3,), True), ((), False), (tuple(range(6)), False)])
+def test_a_run_without_a_date_among_dated_ones_is_named(
+    bare: tuple[int, ...], said: bool, spec: Path, tmp_path: Path
+) -> None:
+    runs = with_odd(12, 6, 2, 0.0 * OTHER)
+    runs = [replace(run, first_s=5.0, date=None) if k in bare else run
+            for k, run in enumerate(runs)]  # fmt: skip
+    found = told(spec, kept(spec, tmp_path, runs), tmp_path, 0)
+    assert found["ordered_by"] == ("adding" if bare else "date")
+    words = [one for one in found["cautions"] if "has no date" in one]
+    assert [one.startswith("run 4 (day3.csv) has no date") for one in words] == [True] * said
+
+
+def test_rows_that_a_run_lost_are_said(spec: Path, tmp_path: Path) -> None:
+    """Half of the last run's rows have no time: what they would tell is missing."""
+    runs = with_odd(13, 4, 2, 0.0 * OTHER)
+    runs[3] = replace(runs[3], rows=128, rejected={"no time stamp": 64})
+    runs[2] = replace(runs[2], rows=66, rejected={"no time stamp": 2})
+    for count, said in ((3, []), (4, ["of 128 rows of run 4 (day3.csv) 64 were left out (no time "
+                                      "stamp: 64): it tells of the others alone"])):  # fmt: skip
+        store = kept(spec, tmp_path, runs[:count])
+        assert told(spec, store, tmp_path, 0)["cautions"] == said
+        store.unlink()
