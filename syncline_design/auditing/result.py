@@ -109,6 +109,8 @@ class StreamAudit(Record):
     error_m, tau_crit_s: only with a spec; role: which of its roles this stream is held against.
     cannot_show: what these stamps leave open.  shape: how the stamps follow one another.
     examined: False where its messages carry no stamp of their own, in an order of time.
+    uneven_s: reach of the stamps as recorded about the even rhythm of a sensor, null where they
+    keep none.  copied: every receipt is its stamp once more, but for a constant and rounding.
     """
 
     name: str
@@ -132,6 +134,8 @@ class StreamAudit(Record):
     trace: tuple[EnvelopePoint, ...]
     partial: bool = False
     examined: bool = True
+    uneven_s: float | None = None
+    copied: bool = False
 
     @property
     def sound(self) -> bool:

@@ -19,6 +19,7 @@ from syncline_design.auditing.result import (
     StampNames,
     StreamAudit,
 )
+from syncline_design.auditing.second_time import TwoTimes, two_times
 from syncline_design.auditing.series import in_words
 from syncline_design.auditing.stream import Examined, examined, is_receipt
 from syncline_design.auditing.together import held_together
@@ -200,6 +201,7 @@ def _row(opened: _Opened, one: Examined) -> StreamAudit:
     stream = one.stream
     assert stream.stamps is not None
     times = one.raw.seconds[one.raw.good]
+    two = two_times(one.whole, one.series)
     duration = float(times.max() - times.min()) if times.size > 1 else None
     return StreamAudit(
         name=stream.name, file=str(opened.path), messages=stream.messages, duration_s=duration,
@@ -209,7 +211,8 @@ def _row(opened: _Opened, one: Examined) -> StreamAudit:
         timeline=stream.timeline, quantity=stream.quantity,
         faults=_ordered(one), offset_s=one.offset_s,
         residual_s=_residual(one), smallest_seen=one.smallest, tau_crit_s=None, error_m=None,
-        cannot_show=_cannot_show(one), notes=stream.notes, trace=one.trace, partial=stream.partial,
+        cannot_show=_cannot_show(one, two), notes=stream.notes, trace=one.trace,
+        partial=stream.partial, uneven_s=two.uneven_s, copied=two.copied,
     )  # fmt: skip
 
 
@@ -231,7 +234,7 @@ def _rank(fault: StampFault) -> tuple[bool, bool, float]:
     return (not fault.counts, fault.from_s is not None, fault.from_s or 0.0)
 
 
-def _cannot_show(one: Examined) -> tuple[str, ...]:
+def _cannot_show(one: Examined, two: TwoTimes) -> tuple[str, ...]:
     """What these stamps leave open, in words."""
     names = {f.fault for f in one.faults}
     if one.series.receive is None:
@@ -240,6 +243,9 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
     if one.copied:
         said.append("anything of transport: every receipt is a copy of its stamp, whose rhythm is "
                     "more even than arrivals are")  # fmt: skip
+    elif two.copied:
+        said.append("anything of transport or of a clock: receipts keep to their stamps as copies "
+                    "do, a constant and the file's rounding apart")  # fmt: skip
     elif names & {"stamped_on_arrival", "packetised"}:
         said.append("how long the data were on their way before they were stamped")
     elif one.constant_s is not None and one.constant_s > 0.0:

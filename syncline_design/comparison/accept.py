@@ -175,7 +175,8 @@ def _said(case: Case, one: Assumed, evidence: _Evidence, seed: int) -> Iterator[
                else by_unnamed_clock(case, one, vehicle, study, seed))  # fmt: skip
     if one.name == "timing" and f"{one.stage}/{one.role}" in evidence.clocks:
         yield by_clock(one, evidence.clocks[f"{one.stage}/{one.role}"], Resting.of(case))
-    stamped = None if evidence.stamps is None else by_stamps(one, evidence.stamps)
+    horizon_s = Resting.of(case).horizon_s
+    stamped = None if evidence.stamps is None else by_stamps(one, evidence.stamps, horizon_s)
     if one.name == "timing" and stamped is not None:
         yield stamped
     if evidence.log is not None:

@@ -9,8 +9,9 @@ from typing import Final
 from syncline_design.auditing.result import Audit, StampFault, StreamAudit
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.by_clock import LONGER
 from syncline_design.comparison.judgement import Judgement
-from syncline_design.model.figure_text import format_duration
+from syncline_design.model.figure_text import format_duration, to_digits
 
 # faults of the recorder and of the way to it, not of the stamps
 _ON_THE_WAY: Final = (
@@ -22,10 +23,11 @@ _LATE: Final = "stamped_on_arrival"  # as a design may mean it
 LEAST_MESSAGES: Final = 59
 
 
-def by_stamps(one: Assumed, found: Audit) -> Judgement | None:
+def by_stamps(one: Assumed, found: Audit, horizon_s: float) -> Judgement | None:
     """Of the stream that plays the role, if one does: a fault breaks its timing.
 
     Receipt minus stamp holds transport too: it can bear a bound out, never break it alone.
+    horizon_s: for how long the spec's clocks have to keep their bounds.
     """
     stream = next((s for s in found.streams if s.role == f"{one.stage}.{one.role}"), None)
     if stream is None or one.value is None:
@@ -35,7 +37,7 @@ def by_stamps(one: Assumed, found: Audit) -> Judgement | None:
     if faults:
         words = "; ".join(f"{f.fault}: {f.evidence}" for f in own or faults)
         if own and _within(own, stream, one.value):
-            return _sound(one.value, stream, _apart(stream, _recorded(stream)), words)
+            return _sound(one.value, stream, _apart(stream, _recorded(stream)), horizon_s, words)
         if own:
             return Judgement("broken", f"stream {stream.name}: {words}", _figure(own, stream))
         return Judgement("not_shown", f"stream {stream.name}: its receipts say nothing: {words}")
@@ -43,7 +45,7 @@ def by_stamps(one: Assumed, found: Audit) -> Judgement | None:
     size = stream.residual_s.as_recorded if late else stream.residual_s.bound
     if stream.stamps.secondary is None or size is None:
         return Judgement("not_shown", f"stream {stream.name} has one time a message")
-    return _sound(one.value, stream, _apart(stream, size))
+    return _sound(one.value, stream, _apart(stream, size), horizon_s)
 
 
 def _apart(stream: StreamAudit, size: float) -> float:
@@ -103,22 +105,64 @@ def _sizes(fault: StampFault, duration_s: float) -> Iterator[float]:
             yield abs(value)
 
 
-def _sound(bound_s: float, stream: StreamAudit, size: float, but: str = "") -> Judgement:
+def _sound(
+    bound_s: float, stream: StreamAudit, size: float, horizon_s: float, but: str = ""
+) -> Judgement:
     """size: the longest time between a stamp and its receipt: so much too early stamps can be.
 
     but: faults that are smaller than what is assumed.
 
-    A delay before a stamp is taken shows in neither time; that is what `latency` asks.
+    How late stamps come by turns shows against the sensor's rhythm alone, as receipts come after
+    them whatever they were late by.  A delay before a stamp that is constant shows in neither; that
+    is what `latency` asks.
     """
-    seen, asked = format_duration(size), format_duration(bound_s)
+    uneven = stream.uneven_s
+    most = size if uneven is None else max(size, uneven)
     state = f"stays within what is assumed ({but})" if but else "is sound"
-    figure = MeasuredFigure(size, 0.0, size)
-    lead = f"stream {stream.name} {state}; receipts come within {seen} of their stamps"
+    figure = MeasuredFigure(most, 0.0, most)
+    lead = (f"stream {stream.name} {state}; receipts come within {format_duration(size)} of their "
+            "stamps")  # fmt: skip
+    if uneven is not None:
+        lead += f", which keep an even rhythm within {format_duration(uneven)}"
+    why = _why_not(bound_s, stream, size, horizon_s)
+    if why:
+        return Judgement("not_shown", lead + why, figure)
+    return Judgement("holds", f"{lead}, and {format_duration(bound_s)} are assumed; a constant "
+                     "delay before the stamp was taken would not show here (`latency`)", figure
+                     )  # fmt: skip
+
+
+def _why_not(bound_s: float, stream: StreamAudit, size: float, horizon_s: float) -> str:
+    """Why a stream without a fault beyond the bound does not bear it out; "" where it does."""
+    asked, uneven = format_duration(bound_s), stream.uneven_s
+    if stream.copied:
+        return ("; but for a constant and the file's rounding the receipts are copies of the "
+                "stamps, and no second time: record when each message arrives")  # fmt: skip
     if stream.messages < LEAST_MESSAGES:
-        return Judgement("not_shown", f"{lead}, but {stream.messages} messages bear no bound out: "
-                         f"{LEAST_MESSAGES} are needed", figure)  # fmt: skip
-    if size <= bound_s:
-        return Judgement("holds", f"{lead}, and {asked} are assumed; a delay before the stamp was "
-                         "taken would not show here (`latency`)", figure)  # fmt: skip
-    return Judgement("not_shown", f"{lead}, transport included: more than the {asked} assumed",
-                     figure)  # fmt: skip
+        return f", but {stream.messages} messages bear no bound out: {LEAST_MESSAGES} are needed"
+    if size > bound_s:
+        return f"; transport included, that is more than the {asked} assumed"
+    if uneven is None:
+        return (", but they keep no even rhythm, so that a stamp that was taken late, near its "
+                "receipt, would not show: a log of its clock would tell")  # fmt: skip
+    if uneven > bound_s:
+        return (f", more than the {asked} assumed: late stamps or a sensor that measures unevenly, "
+                "receipts follow both")  # fmt: skip
+    return _too_short(bound_s, stream, horizon_s)
+
+
+def _too_short(bound_s: float, stream: StreamAudit, horizon_s: float) -> str:
+    """Why a log is too short for the spec's horizon: a drift that it would not have shown."""
+    lasts_s, least = stream.duration_s or 0.0, stream.smallest_seen.drift_ppm
+    if horizon_s <= LONGER * lasts_s:
+        return ""
+    lasts, over = format_duration(lasts_s), format_duration(horizon_s)
+    asked = format_duration(bound_s)
+    if least is None:
+        return f", but {lasts} are too short to show a drift, and the spec's horizon is {over}"
+    grown_s = least * 1e-6 * horizon_s
+    if grown_s <= bound_s:
+        return ""
+    return (f", but in {lasts} a drift of less than {to_digits(least, 2)} ppm does not show, which "
+            f"makes {format_duration(grown_s)} over the spec's horizon of {over}, more than the "
+            f"{asked} assumed: a longer log would show it")  # fmt: skip
