@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import calendar
 import re
+from dataclasses import field
 from functools import lru_cache
 from typing import Final
 
 from syncline_design.clocks.series import Row, SourceKind
+from syncline_design.machine.quick_dataclass import dataclass
 
 _STAMP: Final = re.compile(r"(\d{4})-(\d\d)-(\d\d)$")
 _CLOCK: Final = re.compile(r"(\d\d):(\d\d):(\d\d(?:\.\d+)?)$")
@@ -20,8 +22,51 @@ _LEAPS: Final = frozenset("N+-?")
 _TESTS: Final = re.compile(r"[01]{3}")
 _DISTANT_SKEW: Final = 1e5  # ppm; chronyd starts with 1e6 where no drift file says better
 UNSET: Final = "0.0.0.0"
+_BANNER: Final = "===="
+_BANNER_EACH: Final = 32  # lines, by default (chrony.conf(5), logbanner)
+_CYCLE_S: Final = 3600.0  # lines with a banner between them and no longer apart are of one run
+_STARTING_S: Final = 1.0  # chronyd's root dispersion at its start: no silence of days reaches it
 
 TRACKING: Final = SourceKind("chrony tracking", "chrony", 1, "servo", "utc")
+
+
+@dataclass(slots=True)
+class ChronyReader:
+    """One file; which of its banners say that it was opened anew.
+
+    chronyd writes a banner before the first line that it writes into a file, and each so many lines
+    from there on: one that comes out of turn is a start of the daemon (or of its logs).
+    """
+
+    lines: int = 0
+    turns: set[int] = field(default_factory=lambda: {_BANNER_EACH})
+    after_banner: bool = False
+    named: set[str] = field(default_factory=set)  # sources since the last banner
+    anew: bool = False
+    last_s: float = float("nan")
+
+    def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
+        """As `row`, with what the banners before it say."""
+        if line.startswith(_BANNER):
+            self.after_banner = True
+            return None
+        found = row(line)
+        if found is None:
+            return None
+        kind, said, reference = found
+        if self.after_banner:
+            self._turn(said.time_s)
+        self.lines, self.last_s = self.lines + 1, said.time_s
+        opened = said.opened or (self.anew and kind.name not in self.named)
+        self.named.add(kind.name)
+        return kind, said._replace(opened=opened), reference
+
+    def _turn(self, time_s: float) -> None:
+        if time_s - self.last_s <= _CYCLE_S:
+            self.turns.add(self.lines)
+        self.anew = self.lines > 0 and self.lines not in self.turns
+        self.after_banner, self.lines = False, 0
+        self.named.clear()
 
 
 def row(line: str) -> tuple[SourceKind, Row, str] | None:
@@ -85,7 +130,8 @@ def _tracking(time_s: float, cells: list[str]) -> Row:
             hard = max(hard, float(cells[13]))
     locked = cells[7] != "?" and cells[2] != UNSET
     restart = not locked and skew >= _DISTANT_SKEW
-    return Row(time_s, offset, hard, locked, 1e-6 * float(cells[4]), 1e-6 * skew, restart)
+    rate = 1e-6 * float(cells[4])
+    return Row(time_s, offset, hard, locked, rate, 1e-6 * skew, restart, hard >= _STARTING_S)
 
 
 def _measurement(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str]:

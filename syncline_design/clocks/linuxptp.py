@@ -50,6 +50,7 @@ class PtpReader:
 
     began: set[tuple[str, str]] = field(default_factory=set)
     last: dict[tuple[str, str], SourceKind] = field(default_factory=dict)
+    processes: dict[str, str] = field(default_factory=dict)
 
     def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
         """A line of any of the three programs that holds an offset, or says that lock was lost."""
@@ -71,8 +72,16 @@ class PtpReader:
         time_s, said = float(at[1]), rest[at.end() :]
         tag = _TAG.search(said)
         key = (program[1], tag[1] if tag else "")
+        if at is not stamps[0]:
+            self._of_process(program[1], stamps[0][1])
         body = said[tag.end() :] if tag else said
         return self._state(key, time_s, body) or self._sample(key, time_s, body)
+
+    def _of_process(self, program: str, process: str) -> None:
+        """Another process of a program is another run of it."""
+        if self.processes.setdefault(program, process) != process:
+            self.began |= {key for key in self.last if key[0] == program}
+        self.processes[program] = process
 
     def _state(
         self, key: tuple[str, str], time_s: float, body: str

@@ -32,7 +32,9 @@ def row(line: str) -> tuple[SourceKind, Row, str] | None:
         if len(cells) == 7:
             rate = 1e-6 * float(cells[3])
             skew = 1e-6 * float(cells[5])
-            return LOOPSTATS, Row(time_s, -float(cells[2]), rate=rate, skew=skew), ""
+            # ntpd begins with no wander at all
+            row = Row(time_s, -float(cells[2]), rate=rate, skew=skew, opened=skew == 0.0)
+            return LOOPSTATS, row, ""
     except ValueError:
         pass
     return None

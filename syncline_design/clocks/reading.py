@@ -15,6 +15,7 @@ from syncline_design.clocks import chrony, columns, linuxptp, ntpd, pulses
 from syncline_design.clocks.files import LogFile, no_text, read_files, refused
 from syncline_design.clocks.repeats import demand_once
 from syncline_design.clocks.series import FARTHEST_S, ClockSeries, Row, Sheet, SourceKind, series_of
+from syncline_design.clocks.starts import with_starts
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
@@ -22,7 +23,7 @@ from syncline_design.spec.load import BadInput
 
 _Read = Callable[[str], tuple[SourceKind, Row, str] | None]
 _LINE_READERS: Final[dict[str, Callable[[], _Read]]] = {
-    "chrony": lambda: chrony.row,
+    "chrony": lambda: chrony.ChronyReader().row,
     "ntpd": lambda: ntpd.row,
     "linuxptp": lambda: linuxptp.PtpReader().row,
     "gpsd": lambda: pulses.gpsd_row,
@@ -58,7 +59,7 @@ def read_logs(paths: Sequence[Path]) -> ClockLogs:
         notes += said
         for sheet in read:
             sheets.setdefault((file.log, sheet.kind.name), []).append((file, sheet))
-    series = [_joined(parts) for parts in sheets.values()]
+    series = with_starts([_joined(parts) for parts in sheets.values()])
     demand_once(series)
     freed = [_free_running(one) for one in series]
     notes += [said for _, said in freed if said]

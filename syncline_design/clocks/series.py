@@ -27,6 +27,8 @@ class Row(NamedTuple):
     offset_s: local minus reference, not a number in a line that only says that lock was lost.
     hard_s: bound of the error by the daemon's own dispersions and delays; not a number: none
     known.  rate: frequency against the reference [s/s].  skew: what that rate is uncertain by.
+    restart: the daemon says that it begins anew.  opened: its log was opened anew before this
+    line, which a start does (and no outage).
     """
 
     time_s: float
@@ -36,6 +38,7 @@ class Row(NamedTuple):
     rate: float = math.nan
     skew: float = math.nan
     restart: bool = False
+    opened: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +99,7 @@ class ClockSeries:
     rate: Array
     skew: Array
     restart: Flags
+    opened: Flags
     references: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
@@ -106,7 +110,7 @@ class ClockSeries:
         return ClockSeries(
             self.kind, self.files, self.time_s[chosen], self.offset_s[chosen], self.hard_s[chosen],
             self.locked[chosen], self.rate[chosen], self.skew[chosen], self.restart[chosen],
-            self.references,
+            self.opened[chosen], self.references,
         )  # fmt: skip
 
 
@@ -116,7 +120,8 @@ def series_of(
     """Rows of several files as columns."""
     table = np.concatenate([sheet.columns for sheet in sheets])
     references = frozenset[str]().union(*(sheet.references for sheet in sheets))
-    time_s, offset_s, hard_s, locked, rate, skew, restart = table.T.copy()
+    time_s, offset_s, hard_s, locked, rate, skew, restart, opened = table.T.copy()
     return ClockSeries(
-        kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5, references
+        kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5,
+        opened > 0.5, references,
     )  # fmt: skip

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from syncline_design.clocks.series import Array, ClockSeries, Flags
+from syncline_design.clocks.starts import OF_NO_STARTS, cuts
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 
@@ -25,6 +26,9 @@ GAP_FACTOR: Final = 10.0  # of the median interval between samples
 STEP_SIGMAS: Final = 12.0
 LEAST_SAMPLES: Final = 20
 SHORTEST_S: Final = 90.0
+USUAL_SHARE: Final = 0.95  # of a session's time
+PIECES: Final = 20  # of a silence
+BEYOND_USUAL: Final = 3.0  # times what a session keeps to: a first row that a silence brought
 MOST_SKEW: Final = 1e-3  # larger ones say that the daemon knows nothing yet
 _DAY: Final = 86400.0
 
@@ -50,12 +54,17 @@ class ClockEvent:
 
 @dataclass(frozen=True, slots=True)
 class ClockSession:
-    """One run of the clock, from a start to its end; steady: rows that the bounds are made of."""
+    """One run of the clock, from a start to its end.
+
+    steady: rows that the bounds are made of.  silences: of times without samples, in pieces, how
+    far off the clock was by what was seen at either end [s], and for how long [s].
+    """
 
     series: ClockSeries
     steady: Flags
     weight_s: Array
     events: tuple[ClockEvent, ...]
+    silences: Array
 
     @property
     def duration_s(self) -> float:
@@ -73,8 +82,13 @@ class ClockSession:
         return int(np.sum(self.steady)) >= LEAST_SAMPLES and self.duration_s >= SHORTEST_S
 
     def quantile_s(self, share: float) -> float:
-        """The |offset| that is kept for this share of the time."""
-        return weighted_quantile(np.abs(self.offsets), self.weight_s[self.steady], share)
+        """The |offset| that is kept for this share of the time.
+
+        In a silence it is taken to go evenly from what was seen before to what was seen after.
+        """
+        sizes = np.concatenate([np.abs(self.offsets), self.silences[:, 0]])
+        weights = np.concatenate([self.weight_s[self.steady], self.silences[:, 1]])
+        return weighted_quantile(sizes, weights, share)
 
     @property
     def hard_s(self) -> float:
@@ -96,24 +110,32 @@ def weighted_quantile(values: Array, weights: Array, share: float) -> float:
 
 
 def sessions_of(series: ClockSeries, gap_s: float) -> list[ClockSession]:
-    """A log cut at restarts, at gaps longer than `gap_s`, and where stamps begin anew."""
+    """A log cut at starts (`starts.cuts`), and where stamps begin anew."""
     if not len(series):
         return []
-    ends = [0, *_cuts(series, gap_s).tolist(), len(series)]
+    ends = [0, *cuts(series, gap_s).tolist(), len(series)]
     parts = [series.part(slice(a, b)) for a, b in itertools.pairwise(ends)]
-    return [_session(part) for part in parts]
+    found = [_session(part) for part in parts]
+    if series.kind.family in OF_NO_STARTS:
+        pairs = itertools.pairwise(found)
+        found[1:] = [_after_silence(before, after) for before, after in pairs]
+    return found
+
+
+def _after_silence(before: ClockSession, after: ClockSession) -> ClockSession:
+    """What a silence between sessions brought, where the log would not tell a start from it."""
+    series = after.series
+    begins, ends = float(before.series.time_s[-1]), float(series.time_s[0])
+    size = _size(series.offset_s[:1])
+    usual = after.quantile_s(USUAL_SHARE) if np.any(after.steady) else math.inf
+    if ends <= begins or series.restart[0] or size <= BEYOND_USUAL * usual:
+        return after
+    return replace(after, events=(ClockEvent("gap", begins, ends, size), *after.events))
 
 
 def count_of(series: ClockSeries, gap_s: float) -> int:
     """How many sessions there would be."""
-    return int(_cuts(series, gap_s).shape[0]) + 1
-
-
-def _cuts(series: ClockSeries, gap_s: float) -> NDArray[np.int64]:
-    """The first rows of all sessions but the first."""
-    steps = np.diff(series.time_s)
-    begun = series.restart[1:] & ~series.restart[:-1]  # several such lines are one start
-    return np.flatnonzero((steps > gap_s) | (steps < -1.0) | begun) + 1
+    return int(cuts(series, gap_s).shape[0]) + 1
 
 
 def went_back(series: ClockSeries) -> list[tuple[float, float]]:
@@ -135,7 +157,8 @@ def _session(series: ClockSeries) -> ClockSession:
               *_gap_events(series, longest), *_step_events(series, steady),
               *_frequency_events(series, steady)]  # fmt: skip
     events.sort(key=lambda event: (event.from_s, event.kind))
-    return ClockSession(series, steady, _weights(series.time_s, longest), tuple(events))
+    weights = _weights(series.time_s, longest)
+    return ClockSession(series, steady, weights, tuple(events), _silences(series, steady, longest))
 
 
 def _longest_interval(time_s: Array) -> float:
@@ -157,6 +180,23 @@ def _weights(time_s: Array, longest: float) -> Array:
     floor = 1e-6 * float(np.max(weights))
     raised: Array = np.maximum(weights, floor)
     return raised
+
+
+def _silences(series: ClockSeries, steady: Flags, longest: float) -> Array:
+    """Of times without samples between two steady rows, in pieces: |offset| and how long each is.
+
+    A clock left alone with the frequency error that it had runs off evenly or, as that grows,
+    later rather than sooner; of a piece the larger end is taken.
+    """
+    steps = np.diff(series.time_s)
+    places = np.flatnonzero((steps > longest) & steady[1:] & steady[:-1])
+    before, after = np.abs(series.offset_s[places]), np.abs(series.offset_s[places + 1])
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    parts = np.arange(1, PIECES + 1) / PIECES
+    sizes = low[:, None] + (high - low)[:, None] * parts
+    lengths = np.repeat(steps[places] / PIECES, PIECES)
+    found: Array = np.column_stack([sizes.ravel(), lengths])
+    return found
 
 
 def _startup(series: ClockSeries) -> Flags:
@@ -210,13 +250,20 @@ def _lock_events(series: ClockSeries, startup: Flags, longest: float) -> list[Cl
 
 
 def _gap_events(series: ClockSeries, longest: float) -> list[ClockEvent]:
-    """Times without samples: the larger offset at the two ends, and what the skew brings."""
+    """Times without samples: the larger offset at the two ends, and what the skew brings.
+
+    Of a daemon that steers it is a holdover too: nothing told it of the time meanwhile.
+    """
     places = np.flatnonzero(np.diff(series.time_s) > longest)
-    return [
-        ClockEvent("gap", float(series.time_s[k]), float(series.time_s[k + 1]),
-                   _size(series.offset_s[k : k + 2]) + _drifted(series, k, k + 1))
-        for k in places.tolist()
-    ]  # fmt: skip
+    steers = series.kind.family not in OF_NO_STARTS and series.kind.steering == "servo"
+    found = []
+    for k in places.tolist():
+        begins, ends = float(series.time_s[k]), float(series.time_s[k + 1])
+        size = _size(series.offset_s[k : k + 2]) + _drifted(series, k, k + 1)
+        found.append(ClockEvent("gap", begins, ends, size))
+        if steers and series.locked[k] and series.locked[k + 1]:  # else it is one of lost lock
+            found.append(ClockEvent("holdover", begins, ends, size))
+    return found
 
 
 def _step_events(series: ClockSeries, steady: Flags) -> list[ClockEvent]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field
@@ -16,6 +15,7 @@ from syncline_design.clocks import stability
 from syncline_design.clocks.doubts import doubts
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.reading import read_logs
+from syncline_design.clocks.remarks import MOST_EVENTS, SeenFigures, remarks
 from syncline_design.clocks.result import (
     ClockEntryKind,
     EventResult,
@@ -44,16 +44,12 @@ from syncline_design.clocks.tolerance import (
     tolerance_bound,
     unseen_share,
 )
-from syncline_design.clocks.trend import running_off
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
+from syncline_design.model.figure_text import percent
 
-MOST_EVENTS: Final = 1000
 MOST_BINS: Final = 1500
 MOST_SESSIONS: Final = 20_000
-APART: Final = 3.0  # times the next largest session, from which one alone makes a bound wide
-LONG_ENOUGH: Final = 10.0  # times what a session remembers
 VALUES: Final = 999  # quantiles that stand for the distribution in a catalog
 _HOLDOVERS_S: Final = (60.0, 600.0, 3600.0, 14400.0)
 Use = Literal["larger", "statistical", "hard"]
@@ -105,6 +101,8 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     figures = _figures(counted, sessions, settings, claimable=not doubted)
     claim = _claim(counted, chosen, settings, figures, doubted)
     results = tuple(_session(s, settings.coverage) for s in sessions)
+    seen = SeenFigures(figures.quantiles, figures.bound_s, figures.statistical_s, figures.hard_s,
+                       settings.gap_s)  # fmt: skip
     timing = Timing(
         sessions=results,
         bound_s=figures.bound_s,
@@ -123,7 +121,7 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
         conditions=settings.conditions,
         evidence=logs.files,
         doubts=doubted,
-        notes=(*logs.notes, *chosen.notes, *_notes(sessions, results, figures)),
+        notes=(*logs.notes, *chosen.notes, *remarks(sessions, results, seen)),
         version=__version__,
     )
     return TimingStudy(timing, _distribution(counted))
@@ -320,71 +318,6 @@ def _trace(sessions: Sequence[ClockSession]) -> tuple[TracePoint, ...]:
             found.append(TracePoint(index, float(times[a]), float(np.min(part)),
                                     float(np.max(part))))  # fmt: skip
     return tuple(found)
-
-
-def _notes(
-    sessions: Sequence[ClockSession], results: Sequence[SessionResult], figures: _Figures
-) -> list[str]:
-    said = []
-    short = sum(not s.is_counted for s in sessions)
-    if short:
-        said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
-                    "(less than 20 samples in lock, or than 90 s)")  # fmt: skip
-    if _overlap(sessions):
-        said.append("sessions overlap in time: if these are several clocks, the claim is for such "
-                    "clocks together")  # fmt: skip
-    brief = sum(
-        one.counted
-        and one.autocorrelation_s is not None
-        and one.duration_s < LONG_ENOUGH * one.autocorrelation_s
-        for one in results
-    )
-    if brief:
-        said.append(f"{brief} of {len(results)} sessions are shorter than ten times what they "
-                    "remember: the claim is for sessions no longer than these")  # fmt: skip
-    largest = float(np.max(figures.quantiles, initial=0.0))
-    if figures.statistical_s is not None and figures.statistical_s > 3.0 * largest > 0.0:
-        times = figures.statistical_s / largest
-        said.append(f"the bound is {to_digits(times, 3)} times the largest session: more would "
-                    f"narrow it{_stands_apart(sessions, figures.quantiles)}")  # fmt: skip
-    lengths = [s.duration_s for s in sessions if s.is_counted]
-    if lengths and max(lengths) > 2.0 * min(lengths):
-        said.append(f"sessions of {format_duration(min(lengths))} to "
-                    f"{format_duration(max(lengths))}: the claim is for such a mixture, "
-                    "drift makes long ones worse")  # fmt: skip
-    off = running_off([s for s in sessions if s.is_counted], figures.statistical_s)
-    if off is not None:
-        said.append(off)
-    alone = max((e.daemon_s for s in sessions for e in s.events), default=0.0)
-    if alone > (figures.bound_s or 0.0):
-        most = format_duration(rounded(alone, 3))
-        said.append(f"while lock was lost the clock may have been {most} off, by the daemon's own "
-                    "word: the bound with events says so")  # fmt: skip
-    total = sum(len(s.events) for s in sessions)
-    if total > MOST_EVENTS:
-        said.append(f"{total} events, of which the {MOST_EVENTS} largest are listed")
-    if figures.hard_s is None and figures.bound_s is not None:
-        said.append("no hard bound: what is used of these logs holds no dispersions or delays")
-    return said
-
-
-def _stands_apart(sessions: Sequence[ClockSession], quantiles: Array) -> str:
-    """Which session of a few makes the bound wide, where one is far beyond all others."""
-    order = np.argsort(quantiles)
-    if quantiles.shape[0] < 2 or quantiles[order[-1]] <= APART * quantiles[order[-2]]:
-        return ""
-    one = [s for s in sessions if s.is_counted][int(order[-1])].series
-    begin = moment(float(one.time_s[0]), one.kind.stamps)
-    sizes = [format_duration(rounded(float(quantiles[k]), 3)) for k in (order[-1], order[-2])]
-    return (f"; the session from {begin} alone makes it so wide ({sizes[0]}, the others "
-            f"{sizes[1]} at most): see what happened there")  # fmt: skip
-
-
-def _overlap(sessions: Sequence[ClockSession]) -> bool:
-    """Whether two sessions with dates were at the same time."""
-    spans = sorted((float(s.series.time_s[0]), float(s.series.time_s[-1]))
-                   for s in sessions if s.series.kind.stamps == "utc")  # fmt: skip
-    return any(after[0] < before[1] for before, after in itertools.pairwise(spans))
 
 
 def _distribution(counted: Sequence[ClockSession]) -> Array:
