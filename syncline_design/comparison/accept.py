@@ -26,7 +26,11 @@ from syncline_design.comparison.by_log import by_log
 from syncline_design.comparison.by_stamps import by_stamps
 from syncline_design.comparison.by_unnamed_clock import by_unnamed_clock
 from syncline_design.comparison.departing import Departing
-from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_files
+from syncline_design.comparison.evidence_files import (
+    EvidenceFiles,
+    demand_own_clocks,
+    evidence_files,
+)
 from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
@@ -122,6 +126,7 @@ def _evidence(
     share = max(settings.timing.coverage, coverage_of(case))
     timing = replace(settings.timing, coverage=share)
     studies = {name: study_logs(paths, timing) for name, paths in files.clocks.items()}
+    demand_own_clocks(case, files.clocks)
     audited = None
     if files.stamps and "timing" in settings.asked:
         audited = held_against(audit(files.stamps), case, seed)

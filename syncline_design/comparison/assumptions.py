@@ -28,7 +28,8 @@ _UNITS: Final[dict[AssumptionName, str]] = {
 class Assumed:
     """One assumption: where, what, its figure (SI), and the key of the spec that says it.
 
-    on_arrival: of a timing, whether the design itself stamps on arrival.
+    on_arrival: of a timing, whether the design itself stamps on arrival.  holdover_s: of a clock,
+    for how long without a reference its figure is [s], None where it is of a clock in lock.
     """
 
     stage: str
@@ -37,6 +38,7 @@ class Assumed:
     value: float | None
     key: KeyPath
     on_arrival: bool = False
+    holdover_s: float | None = None
 
     @property
     def unit(self) -> str:
@@ -57,7 +59,7 @@ def assumptions(case: Case, verdict: Verdict, told: Collection[str] = ()) -> tup
     for stage, named in zip(case.stages, design.stages, strict=True):
         for role in stage.roles:
             found += _of_sensor(stage, role.role, named.roles[role.role])
-        found += _of_vehicle(stage, design, found, told)
+        found += _of_vehicle(case, stage, design, found, told)
         found += _of_platform(stage)
     return tuple(found)
 
@@ -73,8 +75,9 @@ def _of_sensor(stage: StageCase, role: RoleName, named: NamedRole) -> Iterator[A
 
 
 def _of_vehicle(
-    stage: StageCase, design: NamedDesign, before: list[Assumed], told: Collection[str]
-) -> Iterator[Assumed]:
+    case: Case, stage: StageCase, design: NamedDesign, before: list[Assumed],
+    told: Collection[str],
+) -> Iterator[Assumed]:  # fmt: skip
     """The host clock of a vehicle, at the first of its stages."""
     vehicle = stage.choice.vehicle_name
     clock = next((one for one in design.clocks if one.vehicle == vehicle), None)
@@ -83,7 +86,10 @@ def _of_vehicle(
         return
     name, key = stage.choice.name, ("stages", stage.index)
     if clock is not None:
-        yield Assumed(name, "clock", "clock", clock.offset_bound_s, (*key, "clock"))
+        entry = case.clock(vehicle, clock.id)
+        free_s = None if entry is None or entry.holdover is None else float(entry.holdover)
+        place = (*key, "clock")
+        yield Assumed(name, "clock", "clock", clock.offset_bound_s, place, holdover_s=free_s)
     elif vehicle in told:
         yield Assumed(name, "clock", "clock", 0.0, key)
 

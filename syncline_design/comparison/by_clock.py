@@ -10,6 +10,7 @@ from syncline_design.clocks.study import TimingStudy
 from syncline_design.clocks.trend import RUN_OFF
 from syncline_design.comparison.acceptance import AssumptionStatus, MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.free_run import no_free_run
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, percent, to_digits
@@ -49,6 +50,8 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
         said = f"measured bound {measured}, {times} the {asked} assumed"
         return Judgement("broken", said, figure)
     why = _why_not(one.value, found, resting)
+    if not why and one.holdover_s is not None:
+        why = no_free_run(one.holdover_s, found)
     status: AssumptionStatus = "not_shown" if why else "holds"
     lead = f"measured bound {measured} within the {asked} assumed"
     return Judgement(status, lead + (why or _rests_on(found)), figure)

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from syncline_design.clocks.reading import is_clock_log
+from syncline_design.clocks.reading import is_clock_log, read_logs
 from syncline_design.comparison.acceptance import EvidenceFile, ReadAs
 from syncline_design.logs import delimited
 from syncline_design.logs.readers import reader_of
@@ -43,6 +43,7 @@ def evidence_files(
     _demand_places(case, assigned)
     for name, paths in assigned.items():
         _demand_clocks(name, paths)
+        _demand_other_logs(name, paths, logs)
     clocks = dict(assigned)
     plain = tuple(path for path in logs if is_clock_log(path))
     if plain:
@@ -92,6 +93,16 @@ def _demand_clocks(name: str, paths: Sequence[Path]) -> None:
                              "clock log", "a log of a clock", path.name, hint),))  # fmt: skip
 
 
+def _demand_other_logs(name: str, paths: Sequence[Path], logs: Sequence[Path]) -> None:
+    """Refuse a log that is given a second time without its owner."""
+    given = {path.absolute() for path in paths}
+    for path in logs:
+        if path.absolute() in given:
+            raise BadInput((Flaw(str(path), 0, 0, "", f"given with --assign {name} and without",
+                                 "each log once", path.name, f"--assign {name}={path} alone"),)
+                           )  # fmt: skip
+
+
 def _only_vehicle(case: Case, log: Path) -> str:
     """Whose clock an unassigned clock log tells of."""
     clocked = [name for name in _vehicles(case) if case.clocks(name)]
@@ -100,6 +111,30 @@ def _only_vehicle(case: Case, log: Path) -> str:
         raise BadInput((Flaw(str(log), 0, 0, "", "a clock log, and the spec has several vehicles",
                              "--assign VEHICLE=LOG for each", ", ".join(known), ""),))  # fmt: skip
     return known[0]
+
+
+def demand_own_clocks(case: Case, clocks: Mapping[str, Sequence[Path]]) -> None:
+    """Refuse logs of one clock that are given for several vehicles: each has a clock of its own,
+    and no two clocks are off by the same from row to row.
+
+    The logs of each are known to be readable, and to hold each session once.
+    """
+    aboard = {s.choice.name: s.choice.vehicle_name for s in case.stages}
+    of = {name: aboard.get(name.partition("/")[0], name) for name in clocks}
+    if len(set(of.values())) < 2:
+        return
+    by_vehicle: dict[str, dict[Path, None]] = {}
+    for name, paths in clocks.items():
+        by_vehicle.setdefault(of[name], {}).update(dict.fromkeys(paths))
+    try:
+        read_logs([path for paths in by_vehicle.values() for path in paths])
+    except BadInput as error:
+        flaw = error.problems[0]
+        raise BadInput((Flaw(flaw.file, flaw.line, flaw.column, "", f"one clock's log for several "
+                             f"vehicles ({', '.join(by_vehicle)}): {flaw.message}",
+                             "a log of each vehicle's own clock", flaw.found,
+                             "where one clock serves them, say so in the spec: the same `vehicle` "
+                             "in their stages"),)) from None  # fmt: skip
 
 
 def _record(path: Path, read_as: ReadAs, of: str = "") -> EvidenceFile:
