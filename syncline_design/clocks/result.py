@@ -58,7 +58,8 @@ class TimingClaim(Record):
     statistical bound was made.  shape_free_from: sessions from which it holds whatever the
     distribution of sessions.  unseen_share: what none of these sessions held may be true of up to
     this share of starts, with the same confidence.  session_s: median length of a session, to
-    which the claim is bound.
+    which the claim is bound.  lock_share: of the time logged what was in lock, of which coverage
+    is a share.
     """
 
     coverage: float
@@ -74,6 +75,7 @@ class TimingClaim(Record):
     method: str | None
     why_not: str | None = optional()
     unseen_share: float | None = optional()
+    lock_share: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

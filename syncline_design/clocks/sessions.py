@@ -56,12 +56,14 @@ class ClockEvent:
 class ClockSession:
     """One run of the clock, from a start to its end.
 
-    steady: rows that the bounds are made of.  silences: of times without samples, in pieces, how
+    steady: rows that the bounds are made of.  slow: rows in lock of its start, after the first
+    update, which are of the statistical bound and not of the daemon's own.  silences: of times without samples, in pieces, how
     far off the clock was by what was seen at either end [s], and for how long [s].
     """
 
     series: ClockSeries
     steady: Flags
+    slow: Flags
     weight_s: Array
     events: tuple[ClockEvent, ...]
     silences: Array
@@ -86,9 +88,22 @@ class ClockSession:
 
         In a silence it is taken to go evenly from what was seen before to what was seen after.
         """
-        sizes = np.concatenate([np.abs(self.offsets), self.silences[:, 0]])
-        weights = np.concatenate([self.weight_s[self.steady], self.silences[:, 1]])
+        rows = self.steady | self.slow
+        sizes = np.concatenate([np.abs(self.series.offset_s[rows]), self.silences[:, 0]])
+        weights = np.concatenate([self.weight_s[rows], self.silences[:, 1]])
         return weighted_quantile(sizes, weights, share)
+
+    @property
+    def start_s(self) -> float:
+        """The largest |offset| in lock after the first update and before the steady state."""
+        return _size(self.series.offset_s[self.slow])
+
+    @property
+    def in_lock_s(self) -> float:
+        """For how much of its time it says how far off the clock was while it was in lock."""
+        rows = self.steady | self.slow
+        told = float(np.sum(self.weight_s[rows]) + np.sum(self.silences[:, 1]))
+        return min(told, self.duration_s)
 
     @property
     def hard_s(self) -> float:
@@ -153,12 +168,15 @@ def _session(series: ClockSeries) -> ClockSession:
     known = np.isfinite(series.offset_s)
     startup = _startup(series)
     steady = known & series.locked & ~startup
+    slow = _after_the_first(known & series.locked & startup)
     events = [*_startup_events(series, startup), *_lock_events(series, startup, longest),
               *_gap_events(series, longest), *_step_events(series, steady),
               *_frequency_events(series, steady)]  # fmt: skip
     events.sort(key=lambda event: (event.from_s, event.kind))
     weights = _weights(series.time_s, longest)
-    return ClockSession(series, steady, weights, tuple(events), _silences(series, steady, longest))
+    return ClockSession(
+        series, steady, slow, weights, tuple(events), _silences(series, steady, longest)
+    )
 
 
 def _longest_interval(time_s: Array) -> float:
@@ -208,6 +226,14 @@ def _startup(series: ClockSeries) -> Flags:
         good &= ~(series.hard_s > STARTUP_FACTOR * usual)
     first = int(np.argmax(good)) if np.any(good) else len(series)
     return np.arange(len(series)) < first
+
+
+def _after_the_first(rows: Flags) -> Flags:
+    """All but the first of them: the first update tells how far off the clock was before it."""
+    found = rows.copy()
+    if np.any(rows):
+        found[int(np.argmax(rows))] = False
+    return found
 
 
 def _size(offsets: Array) -> float:

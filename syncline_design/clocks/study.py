@@ -156,6 +156,7 @@ def _figures(
     hard = max(known) if known else None
     bound = {"larger": max(seen, hard or 0.0), "statistical": seen, "hard": hard}[settings.use]
     sizes = [e.bound_s for s in sessions for e in s.events if e.kind in DISTURBANCES]
+    sizes += [s.start_s for s in sessions]
     event = max([bound or 0.0, *(size + declared for size in sizes)])
     return _Figures(quantiles, statistical, hard, bound, event, method)
 
@@ -188,7 +189,14 @@ def _claim(
         session_s=float(np.median(durations)) if durations else None,
         method=figures.method, why_not=why,
         unseen_share=unseen_share(len(counted), settings.confidence) if counted else None,
+        lock_share=_lock_share(counted),
     )  # fmt: skip
+
+
+def _lock_share(counted: Sequence[ClockSession]) -> float | None:
+    """The share of the time logged of which the claim tells."""
+    logged = math.fsum(s.duration_s for s in counted)
+    return math.fsum(s.in_lock_s for s in counted) / logged if logged > 0.0 else None
 
 
 def _rests_on(chosen: SourceSelection, settings: TimingSettings) -> RestsOn:

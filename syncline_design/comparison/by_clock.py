@@ -99,7 +99,7 @@ def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:
         return f", but no claim: {claim.why_not}"
     if found.event_bound_s is not None and found.event_bound_s > bound_s:
         most = format_duration(found.event_bound_s)
-        return f", but {most} with the steps, unlocks and holdover in these logs"
+        return f", but {most} with the starts, steps, unlocks and holdover in these logs"
     if off := runs_off(found):
         return f", but {off}"
     if 1.0 - claim.coverage > COMMONLY * (1.0 - resting.coverage):

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from syncline_design.report.svg import InlineChart
 
 _MOST_ROWS: Final = 40
+_WHOLE: Final = 0.995  # of the time: less is worth a word
 _MOST_OPEN: Final = 12  # rows of a table that is not folded away
 _OPEN: Final = ("doubts", "spec", "claim", "entry", "offsets", "sessions", "events", "notes")
 _RESTS: Final = {
@@ -129,8 +130,11 @@ def _claim_words(result: Timing) -> str:
     claim = result.claim
     length = "" if claim.session_s is None else f" of {format_duration(claim.session_s)}"
     lost = any(event.kind == "unlock" for event in result.events)
-    in_lock = f" in lock (and within {numbers.time(result.event_bound_s)} else, as seen)"
-    in_lock = in_lock if lost else ""
+    share = claim.lock_share or 1.0
+    in_lock = ""
+    if lost or share < _WHOLE:
+        in_lock = f" in lock ({numbers.percent(share)} of the time logged"
+        in_lock += f"; within {numbers.time(result.event_bound_s)} else, as seen)" if lost else ")"
     return (
         f"With {numbers.percent(claim.confidence)} confidence, at least "
         f"{numbers.percent(claim.session_share)} of future sessions like these ({claim.sessions}"
