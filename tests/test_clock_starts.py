@@ -35,7 +35,7 @@ def _study(folder: Path, slow_rows: int, leap: str = "N") -> TimingStudy:
 
 
 def test_a_slow_start_in_lock_is_of_the_session(tmp_path: Path) -> None:
-    """A quarter of each session: 95 % of its time is within what the first fifth of it is beyond."""
+    """A quarter of each session: what the first twentieth of it is beyond, 95 % is within."""
     study = _study(tmp_path, ROWS // 4)
     found = study.timing
     exact = np.interp(0.05 * ROWS, np.arange(ROWS // 4), np.linspace(OFF_S, 0.02, ROWS // 4))

@@ -57,8 +57,9 @@ class ClockSession:
     """One run of the clock, from a start to its end.
 
     steady: rows that the bounds are made of.  slow: rows in lock of its start, after the first
-    update, which are of the statistical bound and not of the daemon's own.  silences: of times without samples, in pieces, how
-    far off the clock was by what was seen at either end [s], and for how long [s].
+    update, which are of the statistical bound and not of the daemon's own.  silences: of times
+    without samples, in pieces, how far off the clock was by what was seen at either end [s], and
+    for how long [s].
     """
 
     series: ClockSeries
