@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
+from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,6 +69,106 @@ def test_optimize_names_the_measured_clock_and_cautions_as_check_does(tmp_path: 
     of_clock = {one["code"] for one in checked if one.get("entry") == "own_clock"}
     assert {"measured-servo", "assumption"} <= of_clock
     assert of_clock <= {one["code"] for one in told if one.get("entry") == "own_clock"}
+
+
+def entry_of_a_week(folder: Path) -> Path:
+    """An entry beside its logs, as `timing` writes it."""
+    logs = week_of_logs(folder, 1e-4)
+    entry = folder / "own_clock.yaml"
+    done = run("timing", *logs, "--as", "own_clock", "--write-catalog", entry)
+    assert done.exit_code == 0, done.stderr
+    (folder / "spec.yaml").write_text(SPEC, "utf-8")
+    return entry
+
+
+def checked(folder: Path) -> dict[str, Any]:
+    told: dict[str, Any] = json.loads(run("check", folder / "spec.yaml", "-o", "json:-").stdout)
+    return told
+
+
+def bound_of(entry: Path) -> str:
+    (line,) = [one for one in entry.read_text("utf-8").splitlines() if "bound: " in one]
+    return line.partition("bound: ")[2]
+
+
+@pytest.mark.parametrize(
+    "what", ["bound", "coverage", "sessions", "values", "hash", "distribution", "event"]
+)
+def test_an_entry_that_was_edited_is_not_taken_as_measured(tmp_path: Path, what: str) -> None:
+    entry = entry_of_a_week(tmp_path)
+    text = entry.read_text("utf-8")
+    values = tmp_path / "own_clock_values.txt"
+    changed = {
+        "bound": text.replace(f"bound: {bound_of(entry)}", "bound: 12 us"),
+        "coverage": text.replace("coverage: 0.95", "coverage: 0.999"),
+        "sessions": text.replace("sessions: 7", "sessions: 60"),
+        "hash": re.sub(r"(sha256: )(.)", lambda m: m[1] + f"{int(m[2], 16) ^ 1:x}", text, count=1),
+        "distribution": text.replace(
+            "distribution: empirical", "distribution: normal").replace(
+            'file: "own_clock_values.txt"', "{mean: 0 s, std: 1 us}"),
+        "event": text.replace("events: []", "events: [{kind: step, count: 1, largest: 1 ns}]"),
+        "values": text,
+    }[what]  # fmt: skip
+    if what == "distribution":
+        changed = changed.replace(
+            "      {mean: 0 s, std: 1 us}", "      mean: 0 s\n      std: 1 us"
+        )
+    if what == "values":
+        values.write_text(values.read_text("utf-8").replace("s\n", "s\n1e-9\n", 1), "utf-8")
+    assert (changed != text) == (what != "values")
+    entry.write_text(changed, "utf-8")
+    told = checked(tmp_path)
+    (caution,) = [one for one in told["warnings"] if one["code"].startswith("measured")]
+    assert caution["code"] == "measured-altered"
+    assert "own_clock is NOT taken as measured" in caution["message"]
+    assert "measured" not in told
+    done = run("catalog", "check", entry)
+    assert done.exit_code == 1
+    assert "clocks.own_clock.offset: not as it was measured" in done.stdout + done.stderr
+
+
+def test_an_entry_as_written_is_taken_as_measured(tmp_path: Path) -> None:
+    """Figures in other units, other words and prices, and values in another file, are no others."""
+    entry = entry_of_a_week(tmp_path)
+    assert run("catalog", "check", entry).exit_code == 0
+    text = entry.read_text("utf-8")
+    figure, unit = bound_of(entry).split()
+    assert unit == "us"
+    (tmp_path / "own_clock_values.txt").rename(tmp_path / "moved.txt")
+    for old, new in ((f"bound: {figure} us", f"bound: {Decimal(figure) / 1000} ms"),
+                     ("own_clock_values.txt", "moved.txt"), ("cost: 0 EUR", "cost: 12 EUR"),
+                     ("as in the logs, not stated", "in the van")):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    entry.write_text(text, "utf-8")
+    told = checked(tmp_path)
+    assert [one["entry"] for one in told["measured"]] == ["own_clock"]
+    codes = {one["code"] for one in told["warnings"] if one["code"].startswith("measured")}
+    assert codes == {"measured-servo"}
+    assert run("catalog", "check", entry).exit_code == 0
+
+
+def test_an_entry_without_a_digest_is_taken_with_a_caution(tmp_path: Path) -> None:
+    entry = entry_of_a_week(tmp_path)
+    lines = entry.read_text("utf-8").splitlines(keepends=True)
+    entry.write_text("".join(one for one in lines if "digest: " not in one), "utf-8")
+    told = checked(tmp_path)
+    assert [one["entry"] for one in told["measured"]] == ["own_clock"]
+    codes = {one["code"] for one in told["warnings"] if one["code"].startswith("measured")}
+    assert codes == {"measured-servo", "measured-unchecked"}
+    assert run("catalog", "check", entry).exit_code == 0
+
+
+def test_a_log_that_changed_since_is_said(tmp_path: Path) -> None:
+    entry_of_a_week(tmp_path)
+    log = next(iter(sorted(tmp_path.glob("run*.csv"))))
+    log.write_text(log.read_text("utf-8") + "\n", "utf-8")
+    told = checked(tmp_path)
+    (said,) = [one for one in told["warnings"] if one["code"] == "measured-evidence"]
+    assert log.name in said["message"]
+    log.unlink()
+    told = checked(tmp_path)
+    assert "measured-evidence" not in {one["code"] for one in told["warnings"]}
 
 
 def test_signs_of_an_entry(tmp_path: Path) -> None:

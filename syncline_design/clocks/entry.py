@@ -15,10 +15,14 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.result_files import write_files
 from syncline_design.machine.streams import harmless
 from syncline_design.model.figure_text import to_digits
+from syncline_design.spec.files import read_values
 from syncline_design.spec.load import load_builtin
+from syncline_design.spec.timestamp_errors import read_error
+from syncline_design.spec.yaml_text import parse
 
 _ID: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,79}")
 _SECTIONS: Final[dict[ClockEntryKind, str]] = {"clock": "clocks", "timestamping": "timestamping"}
+_KEYS: Final[dict[ClockEntryKind, str]] = {"clock": "offset", "timestamping": "error"}
 _MOST_EVENTS: Final = 20
 _MARK: Final = "# Measured by `syncline-design timing`"
 
@@ -73,6 +77,7 @@ def with_entry(
 ) -> Timing:  # fmt: skip
     """The result with its entry; nothing is written yet."""
     text = entry_text(study.timing, identity, kind, files.values.name, currency)
+    text = _sealed(text, identity, kind, values_text(study, kind))
     entry = CatalogEntry(identity, kind, str(files.catalog), str(files.values), text)
     return replace(study.timing, entry=entry)
 
@@ -102,7 +107,7 @@ def entry_text(
     timing: Timing, identity: str, kind: ClockEntryKind, values_file: str, currency: str
 ) -> str:  # fmt: skip
     """One catalog file with one entry."""
-    claim, key = timing.claim, "offset" if kind == "clock" else "error"
+    claim, key = timing.claim, _KEYS[kind]
     lines = [
         f"{_MARK} {timing.version}.",
         f"{_SECTIONS[kind]}:",
@@ -138,6 +143,14 @@ def entry_text(
     ]  # fmt: skip
     assert claim.made
     return "\n".join(lines) + "\n"
+
+
+def _sealed(text: str, identity: str, kind: ClockEntryKind, values: str) -> str:
+    """The entry with the digest of its figures, as loading will read them."""
+    data = parse(text).data[_SECTIONS[kind]][identity][_KEYS[kind]]
+    read = read_error({**data, "values": tuple(read_values(values, "values"))})
+    before = "      conditions: "
+    return text.replace(before, f"      digest: {read.figures_sha256}\n{before}", 1)
 
 
 def _quoted(text: str) -> str:

@@ -35,6 +35,7 @@ KEYS: dict[str, str] = {
     "declared": "What no log shows and the bound includes, by name: {path_asymmetry: 5 us}.",
     "depth": "How deep the stage is under water; at a depth there is no GNSS.",
     "depth_rating": "How deep the housing may go under water.",
+    "digest": "SHA-256 of the measured figures, written by timing: tells one that was changed.",
     "distance": "Range d to the georeferenced object; of a stage NEAR .. FAR, all of which counts.",
     "distribution": "uniform (low, high), normal (mean, std), constant (value) or empirical.",
     "drift": "Frequency error of a clock on its own; times holdover it adds to the offset.",

@@ -32,6 +32,7 @@ from syncline_design.spec.facts import (
 )
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import Collection, add_builtin, add_file, published_ids
+from syncline_design.spec.measured import ALTERED, MeasuredKeys
 from syncline_design.spec.references import unknown_requirements
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
@@ -42,7 +43,15 @@ FEWEST_SIBLINGS: Final = 4
 CLOSE: Final = 0.02  # between a figure and what its conversion gives: three digits are written
 _ID = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 Code = Literal[
-    "format", "duplicate", "id", "unsourced", "conversion", "siblings", "successor", "published"
+    "format",
+    "duplicate",
+    "id",
+    "unsourced",
+    "conversion",
+    "siblings",
+    "successor",
+    "published",
+    "measured",
 ]
 # Words about an entry, or what its type says anyway: they need no source.
 _PLAIN: Final = frozenset(
@@ -122,7 +131,7 @@ def check_catalogs(paths: Sequence[Path] = ()) -> CatalogCheck:
     sizes = _sizes(every)
     for one in looked_at:
         findings += [*_ids(one), *_sources(one), *_conversions(one), *_successor(one, known)]
-        findings += _siblings(one, sizes)
+        findings += [*_siblings(one, sizes), *_altered(one)]
     findings += _same_names(looked_at, every)
     found = sorted(set(findings), key=lambda f: (f.file, f.line, f.column, f.code, f.message))
     read = (*own, *(one.document for one in looked_at))
@@ -263,6 +272,14 @@ def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[CatalogFl
     if follower is not None and (follower not in known[one.section] or follower == one.id):
         hint = did_you_mean(follower, known[one.section] - {one.id}) or "an id of this section"
         yield one.finding("successor", "lifecycle", f"no such successor: {follower}", hint)
+
+
+def _altered(one: _Place) -> Iterator[CatalogFlaw]:
+    """Entries that say that they were measured, and whose figures are not what was."""
+    for key in ("error", "offset"):
+        error = getattr(one.entry, key, None)
+        if isinstance(error, MeasuredKeys) and error.seal == "differs":
+            yield one.finding("measured", key, "not as it was measured", ALTERED)
 
 
 def _sizes(every: Sequence[_Place]) -> Mapping[tuple[str, str, str], list[float]]:

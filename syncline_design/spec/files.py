@@ -353,7 +353,7 @@ def _empirical_values(
         return None
     try:
         content = read_bytes(inside)
-        values = tuple(_read_values(content.decode("utf-8-sig"), data["file"]))
+        values = tuple(read_values(content.decode("utf-8-sig"), data["file"]))
     except (OSError, UnicodeDecodeError, StopReadingError, UnitError) as error:
         message = f"cannot read the values: {error}"
         collection.problems.append(problem_at(document, at, message))
@@ -362,7 +362,7 @@ def _empirical_values(
     return values
 
 
-def _read_values(text: str, name: str) -> list[Quantity]:
+def read_values(text: str, name: str) -> list[Quantity]:
     """Times of a file: `NUMBER UNIT` per line, or bare numbers under a header that is a unit."""
     lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1)]
     lines = [(n, line) for n, line in lines if line and not line.startswith("#")]

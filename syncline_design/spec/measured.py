@@ -5,10 +5,14 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
-from typing import Annotated, Any, Final
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from syncline_design.spec.fields import (
     Count,
@@ -22,6 +26,13 @@ from syncline_design.spec.fields import (
     refusals,
 )
 
+ALTERED: Final = (
+    "its figures are not those that were written from its logs (its digest does not fit them): "
+    "measure again with timing --as, or take claim, evidence and digest out"
+)
+Seal = Literal["fits", "differs", "none"]
+# keys that are no figure of a measurement: the digest itself, where values and logs lie, words
+_NO_FIGURE: Final = frozenset({"digest", "file", "conditions"})
 _SHA256: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -83,13 +94,32 @@ class MeasuredEvent(FileRecord):
 
 
 class MeasuredKeys(FileRecord):
-    """Keys of an error that was measured; `bound` replaces the distribution's own as tau."""
+    """Keys of an error that was measured; `bound` replaces the distribution's own as tau.
+
+    digest: of the figures as `timing` wrote them, so that one that was changed since is told.  It
+    is a seal against slips and not against forgery: whoever can write the file can make it anew.
+    """
 
     bound: NonNegativeTime | None = None
     claim: MeasuredClaim | None = None
     evidence: tuple[MeasuredLog, ...] = ()
     conditions: str | None = None
     events: tuple[MeasuredEvent, ...] = ()
+    digest: Sha256 | None = None
+
+    @property
+    def figures_sha256(self) -> str:
+        """SHA-256 of every figure in SI: distribution with its values, bound, claim, evidence and
+        events.  The same figure in another unit, and keys in another order, are the same."""
+        figures = json.dumps(_plain(self), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(figures.encode()).hexdigest()
+
+    @property
+    def seal(self) -> Seal:
+        """Whether the figures are those that were measured, as far as the entry can say."""
+        if self.digest is None:
+            return "none"
+        return "fits" if self.digest == self.figures_sha256 else "differs"
 
     @property
     def is_measured(self) -> bool:
@@ -103,3 +133,31 @@ class MeasuredKeys(FileRecord):
                 [(("bound",), refusal("beside calibrated", "one of them", hint="delete one"))]
             )
         return self
+
+
+def _plain(value: Any) -> Any:
+    """Figures as JSON has them; keys that say nothing are none, so that later ones change none."""
+    if isinstance(value, BaseModel):
+        told = ((name, getattr(value, name)) for name in type(value).model_fields)
+        return {
+            name: _plain(one)
+            for name, one in told
+            if name not in _NO_FIGURE and one is not None and one not in ((), {})
+        }
+    if isinstance(value, dict):
+        return {str(name): _plain(one) for name, one in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    return float(value) if isinstance(value, float) else value
+
+
+def changed_logs(error: MeasuredKeys, folder: Path) -> Iterator[str]:
+    """Logs that are where the entry names them, seen from its folder, with another content."""
+    for log in error.evidence:
+        try:
+            with (folder / log.file).open("rb") as stream:
+                found = hashlib.file_digest(stream, "sha256").hexdigest()
+        except (OSError, ValueError):  # not there any more, or never
+            continue
+        if found != log.sha256:
+            yield log.file

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from syncline_design.machine.input_files import FileRead
 from syncline_design.model.figure_text import format_duration, percent, to_digits
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry, TimestampingEntry
 from syncline_design.spec.exact import tau_bound
-from syncline_design.spec.measured import MeasuredClaim
+from syncline_design.spec.measured import ALTERED, MeasuredClaim, changed_logs
 from syncline_design.spec.timestamp_errors import TimestampError
 from syncline_design.verdict.design_data import UsedEntry
 from syncline_design.verdict.tree import Caution, ClaimShown, MeasuredEntry
@@ -34,7 +35,10 @@ def coverage_of(case: Case) -> float:
 
 
 def measured(case: Case, entries: Sequence[UsedEntry]) -> tuple[MeasuredEntry, ...] | None:
-    """The measured errors that a design rests on; None where there are none."""
+    """The measured errors that a design rests on; None where there are none.
+
+    One whose figures were changed since they were measured is none of them.
+    """
     k = case.spec.coverage_factor
     found = tuple(
         MeasuredEntry(
@@ -42,7 +46,7 @@ def measured(case: Case, entries: Sequence[UsedEntry]) -> tuple[MeasuredEntry, .
             error.conditions or "", tuple(FileRead(one.file, one.sha256) for one in error.evidence),
             sum(event.count or 1 for event in error.events),
         )
-        for used, error in _errors(entries)
+        for used, error in _errors(entries) if error.seal != "differs"
     )  # fmt: skip
     return found or None
 
@@ -88,11 +92,50 @@ def claim_words(claim: ClaimShown | None) -> str:
 def claim_cautions(case: Case, entries: Sequence[UsedEntry]) -> Iterator[Caution]:
     """What a verdict takes from a measurement beyond what that claims."""
     for used, error in _errors(entries):
-        yield from _of_entry(case, used, error.claim)
+        key = "error" if used.section == "timestamping" else "offset"
+        if error.seal == "differs":
+            yield Caution("measured-altered", f"{used.id} is NOT taken as measured: {ALTERED}",
+                          entry=used.id, key=key)  # fmt: skip
+            continue
+        if error.seal == "none":
+            message = f"{used.id} says that it was measured, but carries no digest of its figures: "
+            yield Caution("measured-unchecked", f"{message}whether they are those of its logs "
+                          "cannot be checked (timing --as writes one)",
+                          entry=used.id, key=key)  # fmt: skip
+        yield from _changed_logs(case, used, error, key)
+        yield from _of_entry(case, used, error.claim, key)
 
 
-def _of_entry(case: Case, used: UsedEntry, claim: MeasuredClaim | None) -> Iterator[Caution]:
-    key = "error" if used.section == "timestamping" else "offset"
+def _changed_logs(
+    case: Case, used: UsedEntry, error: TimestampError, key: str
+) -> Iterator[Caution]:  # fmt: skip
+    """Logs beside the catalog that are not any more what was measured from."""
+    folder = _folder_of(case, used)
+    changed = [] if folder is None else list(changed_logs(error, folder))
+    if changed:
+        yield Caution("measured-evidence", f"{used.id}: {', '.join(changed[:3])} beside its "
+                      "catalog changed since it was measured: its figures are not of what "
+                      "stands there now", entry=used.id, key=key)  # fmt: skip
+
+
+def _folder_of(case: Case, used: UsedEntry) -> Path | None:
+    """Where the catalog lies that an entry stands in; None of a shipped one, or one in place."""
+    found: Iterator[tuple[str, str]] = (
+        (one.id, one.origin)
+        for stage in case.stages
+        for one in (
+            stage.clocks if used.section == "clocks"
+            else [method for role in stage.roles for method in role.methods]
+        )
+    )  # fmt: skip
+    origin = next((origin for name, origin in found if name == used.id), "")
+    path = Path(origin.rsplit(":", 2)[0])
+    return path.parent if origin and path.is_file() else None
+
+
+def _of_entry(
+    case: Case, used: UsedEntry, claim: MeasuredClaim | None, key: str
+) -> Iterator[Caution]:  # fmt: skip
     if claim is None or claim.made is False:
         message = f"{used.id} was measured, but carries no claim about future sessions"
         yield Caution("measured-claim", message, entry=used.id, key=key)
