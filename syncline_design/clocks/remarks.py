@@ -13,7 +13,6 @@ from syncline_design.clocks.series import Array
 from syncline_design.clocks.sessions import ClockSession
 from syncline_design.clocks.starts import silences
 from syncline_design.clocks.times import moment
-from syncline_design.clocks.trend import running_off
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
 
@@ -64,9 +63,6 @@ def remarks(
         said.append(f"sessions of {format_duration(min(lengths))} to "
                     f"{format_duration(max(lengths))}: the claim is for such a mixture, "
                     "drift makes long ones worse")  # fmt: skip
-    off = running_off([s for s in sessions if s.is_counted], figures.statistical_s)
-    if off is not None:
-        said.append(off)
     alone = max((e.daemon_s for s in sessions for e in s.events), default=0.0)
     if alone > (figures.bound_s or 0.0):
         most = format_duration(rounded(alone, 3))

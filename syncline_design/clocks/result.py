@@ -59,7 +59,8 @@ class TimingClaim(Record):
     distribution of sessions.  unseen_share: what none of these sessions held may be true of up to
     this share of starts, with the same confidence.  session_s: median length of a session, to
     which the claim is bound.  lock_share: of the time logged what was in lock, of which coverage
-    is a share.
+    is a share.  effective_sessions: as many independent ones as these say as much as, where one
+    resembles the next.
     """
 
     coverage: float
@@ -76,6 +77,7 @@ class TimingClaim(Record):
     why_not: str | None = optional()
     unseen_share: float | None = optional()
     lock_share: float | None = optional()
+    effective_sessions: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,10 +140,12 @@ class CatalogEntry(Record):
 class Timing(Record):
     """What logs of a clock show, and what may be claimed from them.
 
-    statistical_bound_s None: too few sessions for one, or logs in doubt; hard_bound_s None: the
-    logs hold no dispersions or delays.  bound_s: the larger of both (`use` says otherwise where the
-    user did), declared terms included; event_bound_s: with lost lock, steps and holdover.  doubts:
-    what forbids any claim until it is explained.
+    statistical_bound_s None: too few sessions for one, sessions that are not alike, or logs in
+    doubt; hard_bound_s None: the logs hold no dispersions or delays.  bound_s: the larger of both
+    (`use` says otherwise where the user did), declared terms included; event_bound_s: with slow
+    starts, lost lock, steps and holdover.  doubts: what forbids any claim until it is explained.
+    reservations: what keeps these logs from bearing a bound out for later sessions or for the
+    whole way, though a claim may be made.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -163,6 +167,7 @@ class Timing(Record):
     evidence: tuple[FileRead, ...]
     doubts: tuple[str, ...]
     notes: tuple[str, ...]
+    reservations: tuple[str, ...]
     version: str
 
     @property

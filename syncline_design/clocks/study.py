@@ -44,6 +44,7 @@ from syncline_design.clocks.tolerance import (
     tolerance_bound,
     unseen_share,
 )
+from syncline_design.clocks.trend import Course
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import percent
@@ -98,8 +99,11 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     doubted = (*chosen.doubts, *doubts(chosen.used, sessions))
     in_force().doing("bounding the clock's error")
     counted = [s for s in sessions if s.is_counted]
-    figures = _figures(counted, sessions, settings, claimable=not doubted)
-    claim = _claim(counted, chosen, settings, figures, doubted)
+    quantiles = np.array([s.quantile_s(settings.coverage) for s in counted])
+    course = Course() if doubted else Course.of(counted, quantiles, settings.coverage)
+    claimable = not doubted and course.forbids is None
+    figures = _figures(counted, sessions, settings, course.effective, claimable=claimable)
+    claim = _claim(counted, chosen, settings, figures, (doubted, course))
     results = tuple(_session(s, settings.coverage) for s in sessions)
     seen = SeenFigures(figures.quantiles, figures.bound_s, figures.statistical_s, figures.hard_s,
                        settings.gap_s)  # fmt: skip
@@ -121,7 +125,8 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
         conditions=settings.conditions,
         evidence=logs.files,
         doubts=doubted,
-        notes=(*logs.notes, *chosen.notes, *remarks(sessions, results, seen)),
+        notes=(*logs.notes, *chosen.notes, *remarks(sessions, results, seen), *course.words),
+        reservations=tuple(course.reservations),
         version=__version__,
     )
     return TimingStudy(timing, _distribution(counted))
@@ -138,11 +143,11 @@ class _Figures:
 
 
 def _figures(
-    counted: Sequence[ClockSession], sessions: Sequence[ClockSession], settings: TimingSettings, *,
-    claimable: bool,
+    counted: Sequence[ClockSession], sessions: Sequence[ClockSession], settings: TimingSettings,
+    effective: float, *, claimable: bool,
 ) -> _Figures:  # fmt: skip
     """The bounds.  With too few sessions for a statistical one, that of these sessions alone; so of
-    logs in doubt, of which nothing can be claimed."""
+    logs in doubt, or sessions that are not alike, of which nothing can be claimed."""
     quantiles = np.array([s.quantile_s(settings.coverage) for s in counted])
     if not counted:
         return _Figures(quantiles, None, None, None, None, None)
@@ -150,7 +155,9 @@ def _figures(
     statistical, method = None, None
     seen = float(np.max(quantiles)) + declared
     if claimable and len(counted) >= LEAST_SESSIONS:
-        raised, method = tolerance_bound(quantiles, settings.session_share, settings.confidence)
+        raised, method = tolerance_bound(
+            quantiles, settings.session_share, settings.confidence, effective
+        )
         statistical = seen = raised + declared
     known = [s.hard_s for s in counted if not math.isnan(s.hard_s)]
     hard = max(known) if known else None
@@ -163,8 +170,10 @@ def _figures(
 
 def _claim(
     counted: Sequence[ClockSession], chosen: SourceSelection, settings: TimingSettings,
-    figures: _Figures, doubted: Sequence[str],
+    figures: _Figures, against: tuple[Sequence[str], Course],
 ) -> TimingClaim:  # fmt: skip
+    """against: doubts of the logs, and what the order of sessions tells."""
+    doubted, course = against
     missing = max(0, LEAST_SESSIONS - len(counted))
     why = None
     if doubted:
@@ -177,9 +186,12 @@ def _claim(
     elif min(int(np.sum(s.steady)) for s in counted) * (1.0 - settings.coverage) < 1.0:
         why = ("too few samples in a session to say what holds for "
                f"{percent(settings.coverage, 6)} of its time")  # fmt: skip
+    elif course.forbids is not None:
+        why = course.forbids
     elif figures.bound_s is None:
         why = "the logs hold nothing that a hard bound could be made of"
     durations = [s.duration_s for s in counted]
+    telling = min(len(counted), course.effective)
     return TimingClaim(
         coverage=settings.coverage, session_share=settings.session_share,
         confidence=settings.confidence, sessions=len(counted),
@@ -188,7 +200,8 @@ def _claim(
         shape_free_from=sessions_of_order_statistic(settings.session_share, settings.confidence),
         session_s=float(np.median(durations)) if durations else None,
         method=figures.method, why_not=why,
-        unseen_share=unseen_share(len(counted), settings.confidence) if counted else None,
+        unseen_share=unseen_share(telling, settings.confidence) if counted else None,
+        effective_sessions=None if math.isinf(course.effective) else course.effective,
         lock_share=_lock_share(counted),
     )  # fmt: skip
 

@@ -23,7 +23,7 @@ def sessions_of_order_statistic(share: float, confidence: float) -> int:
     return math.ceil(math.log1p(-confidence) / math.log(share) - 1e-9)
 
 
-def unseen_share(count: int, confidence: float) -> float:
+def unseen_share(count: float, confidence: float) -> float:
     """What may be true of so many of all starts without having come in any of these sessions.
 
     (1 - p)^n = 1 - confidence: the upper limit of a proportion seen 0 times in n (Clopper and
@@ -46,18 +46,22 @@ def normal_factor(count: int, share: float, confidence: float) -> float:
     return float(nct.ppf(confidence, count - 1, float(ndtri(share)) * root)) / root
 
 
-def tolerance_bound(quantiles: Array, share: float, confidence: float) -> tuple[float, Method]:
+def tolerance_bound(
+    quantiles: Array, share: float, confidence: float, effective: float = math.inf
+) -> tuple[float, Method]:
     """Bound [s] that covers a share of future sessions' quantiles, and what it is made by.
+
+    effective: as many independent sessions as these say as much as, where they are not.
 
     The larger of the largest session, which alone is a bound from as many sessions on as the order
     statistic needs, and of a tolerance bound that takes a transform of the quantiles as normal.
     """
     largest = float(np.max(quantiles))
-    count = int(quantiles.shape[0])
+    count = max(2, math.floor(min(quantiles.shape[0], effective)))
     enough = count >= sessions_of_order_statistic(share, confidence)
     method: Method = "order statistic" if enough else "log-normal"
     positive = quantiles[quantiles > 0.0]
-    if count < 2 or not positive.shape[0]:
+    if quantiles.shape[0] < 2 or not positive.shape[0]:
         return largest, method
     k = normal_factor(count, share, raised_confidence(count, confidence))
     return max(largest, _raised(np.maximum(quantiles, float(np.min(positive))), k)), method

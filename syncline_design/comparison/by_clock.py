@@ -7,7 +7,6 @@ from typing import Final
 from syncline_design.clocks.result import Timing
 from syncline_design.clocks.sessions import DISTURBANCES
 from syncline_design.clocks.study import TimingStudy
-from syncline_design.clocks.trend import RUN_OFF
 from syncline_design.comparison.acceptance import AssumptionStatus, MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.free_run import no_free_run
@@ -79,17 +78,12 @@ def _not_beyond(bound_s: float, found: Timing) -> str:
 
 def narrowed_by(found: Timing) -> str:
     """What would make a bound less that no session reached."""
-    if off := runs_off(found):
-        return f"{off}; more sessions would not narrow the bound"
+    if found.reservations:
+        return f"{found.reservations[0]}; more sessions would not narrow the bound"
     if found.bound_s != found.hard_bound_s:
         return "more sessions would narrow the bound"
     return ("it is the daemon's own, of the delays and dispersions of the path; a shorter path, or "
             "a measurement that does not take it (a pulse), would narrow it")  # fmt: skip
-
-
-def runs_off(found: Timing) -> str:
-    """What the study says of sessions that rise or fall one after the other; "" of none."""
-    return next((note for note in found.notes if note.startswith(RUN_OFF)), "")
 
 
 def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:
@@ -100,8 +94,8 @@ def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:
     if found.event_bound_s is not None and found.event_bound_s > bound_s:
         most = format_duration(found.event_bound_s)
         return f", but {most} with the starts, steps, unlocks and holdover in these logs"
-    if off := runs_off(found):
-        return f", but {off}"
+    if found.reservations:
+        return f", but {found.reservations[0]}"
     if 1.0 - claim.coverage > COMMONLY * (1.0 - resting.coverage):
         return f", but {coverage_words(claim.coverage, resting.coverage)}"
     if claim.session_s is not None and resting.horizon_s > LONGER * claim.session_s:
