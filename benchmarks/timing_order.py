@@ -136,8 +136,8 @@ def report(found: Sequence[Told], studies: int, seed: int) -> str:
              "**Share of studies of which something is said**", *top]  # fmt: skip
     lines += [_row(found, name, lambda c: f"{100 * c.said / c.studies:.1f} %")
               for name in dict.fromkeys(cell.family for cell in found)]  # fmt: skip
-    lines += ["", "**Claims that hold: of sessions taken as independent; those that are made, of how "
-              "many studies**", *top]  # fmt: skip
+    lines += ["", "**Claims that hold: of sessions taken as independent; those that are made, of "
+              "how many studies**", *top]  # fmt: skip
     lines += [_row(found, name, _holding) for name in REMEMBERING]
     return "\n".join(lines) + "\n"
 
