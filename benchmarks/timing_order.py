@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from benchmarks.timing import CONFIDENCE, COVERAGE, FAMILIES, SAMPLES, SHARE, SIGMA_S, Make
 from syncline_design import __version__
 from syncline_design.clocks.tolerance import tolerance_bound
-from syncline_design.clocks.trend import Course
+from syncline_design.clocks.trend import SessionCourse
 
 Array = NDArray[np.float64]
 Ordered = Callable[[np.random.Generator, int], Array]
@@ -93,7 +93,7 @@ def told(name: str, make: Ordered, count: int, studies: int, seed: int, true_s: 
     for _ in range(studies):
         x = make(source, count)
         figures = np.quantile(np.abs(x), COVERAGE, axis=1, method="inverted_cdf")
-        course = Course.of_figures(np.median(x, axis=1), figures, COVERAGE)
+        course = SessionCourse.of_figures(np.median(x, axis=1), figures, COVERAGE)
         said += bool(course.words or course.forbids)
         before += tolerance_bound(figures, SHARE, CONFIDENCE)[0] >= true_s
         if course.forbids is None:

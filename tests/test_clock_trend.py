@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from syncline_design.clocks.study import TimingSettings, TimingStudy, study_logs
-from syncline_design.clocks.trend import GROW, REMEMBER, RUN_OFF, Course, neumann_ratio
+from syncline_design.clocks.trend import GROW, REMEMBER, RUN_OFF, SessionCourse, neumann_ratio
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_clock import Resting, by_clock
 from tests.clock_logs import START, csv_lines, write
@@ -83,7 +83,7 @@ def test_a_clock_that_ages_bears_no_bound_out(
     assert alike.status == ("holds" if assumed_s == 1e-3 else "not_shown")
 
 
-def _courses(level: float, growth: float, keep: float, count: int) -> list[Course]:
+def _courses(level: float, growth: float, keep: float, count: int) -> list[SessionCourse]:
     """200 draws of sessions with a level each that keeps so much of the one before, and a scatter
     that grows by `growth` from one to the next."""
     source, found = np.random.default_rng(count), []
@@ -93,7 +93,7 @@ def _courses(level: float, growth: float, keep: float, count: int) -> list[Cours
             z[k] = keep * z[k - 1] + np.sqrt(1.0 - keep**2) * z[k]
         scatter = np.exp(0.1 * source.normal(size=count)) * (1.0 + growth) ** np.arange(count)
         figures = np.abs(level * z) + 1.65 * scatter
-        found.append(Course.of_figures(level * z, figures, 0.95))
+        found.append(SessionCourse.of_figures(level * z, figures, 0.95))
     return found
 
 

@@ -44,7 +44,7 @@ from syncline_design.clocks.tolerance import (
     tolerance_bound,
     unseen_share,
 )
-from syncline_design.clocks.trend import Course
+from syncline_design.clocks.trend import SessionCourse
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import percent
@@ -100,7 +100,7 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     in_force().doing("bounding the clock's error")
     counted = [s for s in sessions if s.is_counted]
     quantiles = np.array([s.quantile_s(settings.coverage) for s in counted])
-    course = Course() if doubted else Course.of(counted, quantiles, settings.coverage)
+    course = SessionCourse() if doubted else SessionCourse.of(counted, quantiles, settings.coverage)
     claimable = not doubted and course.forbids is None
     figures = _figures(counted, sessions, settings, course.effective, claimable=claimable)
     claim = _claim(counted, chosen, settings, figures, (doubted, course))
@@ -170,7 +170,7 @@ def _figures(
 
 def _claim(
     counted: Sequence[ClockSession], chosen: SourceSelection, settings: TimingSettings,
-    figures: _Figures, against: tuple[Sequence[str], Course],
+    figures: _Figures, against: tuple[Sequence[str], SessionCourse],
 ) -> TimingClaim:  # fmt: skip
     """against: doubts of the logs, and what the order of sessions tells."""
     doubted, course = against

@@ -28,7 +28,7 @@ _FEWEST_GROWING: Final = 5  # 1 / 5! = 0.008
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class SessionCourse:
     """What the order of sessions tells; in words, None where it tells nothing.
 
     effective: as many sessions as these say as much as, were they independent of one another.
@@ -40,14 +40,14 @@ class Course:
     effective: float = math.inf
 
     @classmethod
-    def of(cls, counted: Sequence[ClockSession], figures: Array, coverage: float) -> Course:
+    def of(cls, counted: Sequence[ClockSession], figures: Array, coverage: float) -> SessionCourse:
         """Of sessions; stamps since boot have no order."""
         if not counted or counted[0].series.kind.stamps != "utc":
             return cls()
         return cls.of_figures(np.array([np.median(s.offsets) for s in counted]), figures, coverage)
 
     @classmethod
-    def of_figures(cls, medians: Array, figures: Array, coverage: float) -> Course:
+    def of_figures(cls, medians: Array, figures: Array, coverage: float) -> SessionCourse:
         """Of sessions in their order; figures: the |offset| that each keeps for the share
         `coverage` of its time."""
         if len(figures) < _FEWEST_GROWING:
