@@ -97,3 +97,5 @@ def test_many_runs_have_round_ticks_and_a_table_of_bounded_height(
     assert {"20", "40", "60"} <= set(ticks)
     assert not {"21", "22", "42", "62"} & set(ticks)
     assert 'class="scroll long' in page
+    drawn = "".join(page.split('id="fig-courses')[1:])
+    assert drawn.count("<path") < 75 * len(LABELS)  # not one for every run and parameter

@@ -369,6 +369,8 @@ class Changes:
     def _scattering(self, runs: Runs) -> Differing | None:
         """The effect that differs most clearly from run to run; None where noise would do.  One
         change is none: runs are parted at any."""
+        if not self.terms:
+            return None
         clear, excess, chance = (np.zeros(len(self.terms)) for _ in range(3))
         for g, scatter in zip(self.groups, runs.scatters, strict=True):
             least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)

@@ -77,13 +77,19 @@ class ComparedRuns:
     def doubted(self) -> int | None:
         """The run after which a kept look says what its runs do not; None where none does.
 
-        At every call another of them is computed again.
+        At every call another of them is computed again, and the last where nothing follows it: the
+        answer is mostly its own.
         """
         if not self.kept:
             return None
-        at = len(self.stored.entries) % len(self.kept)
-        anew = _look(self.keys[at], *Changes(self.pool, self.kept).found_anew(at + 1))
-        return None if anew.is_like(self.kept[at]) else at
+        last = len(self.kept) - 1
+        tried = {len(self.stored.entries) % len(self.kept)}
+        tried |= {last} if len(self.kept) == len(self.runs) else set()
+        for at in sorted(tried):
+            anew = _look(self.keys[at], *Changes(self.pool, self.kept).found_anew(at + 1))
+            if not anew.is_like(self.kept[at]):
+                return at
+        return None
 
     @cached_property
     def changes(self) -> Changes:

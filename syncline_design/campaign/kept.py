@@ -11,6 +11,7 @@ import numpy as np
 from syncline_design.campaign.packing import PackingError, lower, packed, unpacked, whole
 from syncline_design.diagnosis.result import Check
 from syncline_design.diagnosis.sufficient import Less, Sufficient, TermLabel
+from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 
@@ -18,6 +19,8 @@ EARLIEST_S: Final = 946_684_800.0  # 2000-01-01: a first stamp from here on is a
 LATEST_S: Final = 4_102_444_800.0  # 2100-01-01
 MOST_PARAMETERS: Final = 2000
 MOST_PARTS: Final = 64
+ROUNDED: Final = 1e-6  # of the largest eigenvalue of a scaled matrix
+LARGEST: Final = 1e60  # information [1 / SI^2] of a parameter, beyond which none is measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +96,23 @@ class Run(Record):
             for part in self.less
         )
         normal, gram = (whole(unpacked(one, (half,)), p) for one in (self.normal, self.gram))
-        return Sufficient(labels, normal, unpacked(self.score, (p,)), self.square, gram, less)
+        score = unpacked(self.score, (p,))
+        for one in (normal, gram, score, *(a for part in less for a in (part.normal, part.score))):
+            if np.max(np.abs(one), initial=0.0) > LARGEST:
+                raise PackingError("a figure larger than any log's")
+        if not _is_information(normal):
+            raise PackingError("no information matrix")
+        return Sufficient(labels, normal, score, self.square, gram, less)
+
+
+def _is_information(normal: Array) -> bool:
+    """Whether a matrix can be one: no eigenvalue below 0, but for rounding."""
+    size = np.diag(normal)
+    if np.any(size < 0.0):
+        return False
+    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    scaled = normal / scale[:, None] / scale
+    return not size.size or bool(np.linalg.eigvalsh(scaled)[0] > -ROUNDED)
 
 
 def label_of(text: str) -> TermLabel:

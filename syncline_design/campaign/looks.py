@@ -18,6 +18,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 
 METHOD: Final = "looks/6"  # another where the evidence is computed in another way
+MOST_RATIO: Final = 1e30
 ALIKE: Final = 1e-3  # nat, and of a variance: more than what another machine rounds otherwise
 
 
@@ -30,6 +31,12 @@ class KeptLook(Record):
     log_evidence: float
     within: tuple[float, ...]
     between: tuple[float, ...]
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether a look can have found that: variances are no less than by chance."""
+        ratios = (*self.within, *self.between)
+        return math.isfinite(self.log_evidence) and all(0.0 <= one < MOST_RATIO for one in ratios)
 
     def is_like(self, other: KeptLook) -> bool:
         """Whether both say the same but for rounding."""

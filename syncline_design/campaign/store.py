@@ -13,7 +13,6 @@ off its end, is believed; keep a copy, or the printed hash of the last line, whe
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,6 +22,7 @@ from typing import Any, Final
 
 from syncline_design import __version__
 from syncline_design.campaign import omissions
+from syncline_design.campaign.chain import START, canonical, digest, line_of
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.omissions import Omission, OmissionError
@@ -33,13 +33,12 @@ from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.machine.appended_files import append_line, whole_lines
 from syncline_design.machine.input_files import UnsuitableError, read_plain
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import NotThisResultError, json_of, read_as
+from syncline_design.machine.records import NotThisResultError, read_as
 from syncline_design.model.system import System
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw
 
 SCHEMA: Final = "syncline-design/store/v1"
-START: Final = "0" * 64
 MOST_BYTES: Final = 2**30
 MOST_DIFFERENCES: Final = 5
 OVERLAP: Final = 0.1  # of the shorter run: two that share more are of one drive
@@ -162,7 +161,7 @@ def _checked(path: Path, line: int, text: bytes, previous: str) -> tuple[dict[st
     try:
         whole = json.loads(text)
         body, own = whole["body"], whole["sha256"]
-        found = whole["previous"] == previous and own == _digest(previous, body)
+        found = whole["previous"] == previous and own == digest(previous, body)
     except (ValueError, TypeError, KeyError, RecursionError):
         raise refused(
             path, "damaged: no line of a store", "lines as `watch` wrote them", line
@@ -183,7 +182,13 @@ def _checked(path: Path, line: int, text: bytes, previous: str) -> tuple[dict[st
 def _head(path: Path, body: dict[str, Any]) -> tuple[str, Any]:
     if body.get("kind") != "store" or body.get("schema") != SCHEMA:
         found = body.get("schema", body.get("kind"))
-        raise refused(path, f"a store of another kind ({found!r})", SCHEMA, 1)
+        raise refused(
+            path,
+            f"a store of another kind ({found!r})",
+            SCHEMA,
+            1,
+            "a store of another version is begun anew: add the logs again",
+        )
     return str(body.get("name", "")), body.get("system")
 
 
@@ -200,6 +205,8 @@ def _looks(path: Path, line: int, body: dict[str, Any]) -> dict[str, KeptLook]:
         found = [read_as(KeptLook, json.dumps(one)) for one in body["looks"]]
     except (NotThisResultError, KeyError, TypeError) as error:
         raise _unreadable(path, line, "looks", error) from None
+    if not all(one.is_possible for one in found):
+        raise refused(path, "damaged: a look that found what no runs can have", "", line)
     return {one.key: one for one in found}
 
 
@@ -304,14 +311,14 @@ def add_run(
         if stored is None:
             head = {"kind": "store", "schema": SCHEMA, "name": name, "version": __version__,
                     "system": description(system)}  # fmt: skip
-            text, last = _line(last, head)
+            text, last = line_of(last, head)
         else:
             demand_system(stored, system, name)
             demand_new(stored, run, path)
             last = stored.last
         number = 1 + (len(stored.entries) if stored is not None else 0)
         own = start if start is not None else f"#{number}"
-        return text + _line(last, {"kind": "run", "start": own, "run": run.to_json()})[0]
+        return text + line_of(last, {"kind": "run", "start": own, "run": run.to_json()})[0]
 
     append_line(path, lines)
 
@@ -323,7 +330,7 @@ def add_baseline(path: Path) -> None:
         stored = _stored(path, kept, None)
         if stored is None:
             raise refused(path, "no store to accept", "a store with runs")
-        return _line(stored.last, {"kind": "baseline", "after": len(stored.entries)})[0]
+        return line_of(stored.last, {"kind": "baseline", "after": len(stored.entries)})[0]
 
     append_line(path, line)
 
@@ -343,7 +350,7 @@ def add_omission(path: Path, number: int, reason: str, *, back: bool = False) ->
             raise refused(path, str(error), expected) from None
         if back:
             _demand_apart(stored, stored.runs[number - 1], path)
-        return _line(stored.last, one.body)[0]
+        return line_of(stored.last, one.body)[0]
 
     append_line(path, line)
 
@@ -355,29 +362,12 @@ def add_looks(known: Stored, looks: Sequence[KeptLook]) -> Stored:
         stored = _stored(known.path, kept, known)
         if stored is None:
             raise refused(known.path, "the store was taken away meanwhile", "a store with runs")
-        return _line(stored.last, {"kind": "looks", "looks": [one.to_json() for one in looks]})[0]
+        return line_of(stored.last, {"kind": "looks", "looks": [one.to_json() for one in looks]})[0]
 
     append_line(known.path, line)
     found = read_store(known.path, known)
     assert found is not None
     return found
-
-
-def _line(previous: str, body: dict[str, Any]) -> tuple[bytes, str]:
-    plain = json.loads(canonical(json_of(body)))
-    own = _digest(previous, plain)
-    return canonical({"previous": previous, "sha256": own, "body": plain}, sort=False).encode(
-        "ascii"
-    ) + b"\n", own
-
-
-def canonical(value: Any, *, sort: bool = True) -> str:
-    """JSON in one way only."""
-    return json.dumps(value, sort_keys=sort, separators=(",", ":"), allow_nan=False)
-
-
-def _digest(previous: str, body: Any) -> str:
-    return hashlib.sha256((previous + canonical(body)).encode("ascii")).hexdigest()
 
 
 def refused(

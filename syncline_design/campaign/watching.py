@@ -103,9 +103,17 @@ def watch(
         in_force().doing("comparing the runs")
         progress("comparing the runs", 0.9)
         found = Watching(case, request, stored, before)
-        if request.files and found.fresh:  # whoever only looks again leaves the store as it is
-            found = replace(found, stored=add_looks(stored, found.fresh))
-        return found.told(torn)
+        try:
+            if request.files and found.fresh:  # whoever only looks again leaves the store as it is
+                found = replace(found, stored=add_looks(stored, found.fresh))
+            return found.told(torn)
+        except np.linalg.LinAlgError:
+            raise refused(
+                request.store,
+                "its runs hold statistics that no log has: someone made the chain anew",
+                "runs as `watch` wrote them",
+                hint="take back a copy of the store, or begin a new one and add the logs again",
+            ) from None
 
 
 def accept(store: Path) -> Stored:

@@ -26,6 +26,7 @@ Key = tuple[str, str, str, str]  # effect, sensor, stage, parameter
 ACROSS: Final = 2
 HEIGHT: Final = 130.0  # of a row of panels
 MOST: Final = 1e12
+SINGLE: Final = 100  # runs up to which each has a mark of its own
 
 
 def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
@@ -99,9 +100,12 @@ def _panel(
             ("Value", f"{value} {unit}".strip()),
             ("95 % interval", " to ".join(f"{end} {unit}".strip() for end in ends)),
         ])  # fmt: skip
-        axes.plot([place, place], [low / scale, high / scale], color=colour, linewidth=1.2)
-    axes.plot([place for place, _ in shown], [v.value / scale for _, v in shown], "o", color=colour,
-              markersize=2.8)  # fmt: skip
+    _intervals(axes, [(place, v.interval95 or (0.0, 0.0)) for place, v in shown], scale, colour)
+    drawn = (
+        {"linewidth": 0.9} if len(shown) > SINGLE else {"marker": "o", "markersize": 2.8, "ls": ""}
+    )
+    axes.plot([place for place, _ in shown], [v.value / scale for _, v in shown], color=colour,
+              **drawn)  # fmt: skip
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
     for place, r in enumerate(runs):
         if r.run in since:
@@ -114,6 +118,18 @@ def _panel(
     axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
     _run_ticks(axes, [r.run for r in runs])
     axes.margins(x=0.06)
+
+
+def _intervals(
+    axes: Axes, ends: Sequence[tuple[int, tuple[float, float]]], scale: float, colour: str
+) -> None:
+    """Intervals as one path with gaps: a path each makes a page of many runs several times as
+    large.  Of many runs they are a pale band behind the values."""
+    gap = math.nan
+    places = [x for place, _ in ends for x in (place, place, gap)]
+    heights = [y for _, (low, high) in ends for y in (low / scale, high / scale, gap)]
+    many = len(ends) > SINGLE
+    axes.plot(places, heights, color=colour, linewidth=1.2, alpha=0.35 if many else 1.0)
 
 
 def _decimals(widths: Sequence[float]) -> int:
