@@ -2,10 +2,10 @@
 
 Forward and backward search over whole effects on the pooled statistics.  An effect is named where
 noise alone would not show it: its chance by the noise fitted and by the scatter of the logs' parts,
-the larger, times the number of effects and scopes it was looked for in (Bonferroni), is below the
-false-alarm rate.  Whether it is one value (of the build), one a start, or one a log is tested by
-the likelihood ratio of separate against common values (for one parameter Cochran's Q); the
-simplest that is not refuted is said.
+the larger, times the tries that looking for it in so many effects (`tries`) and scopes comes to, is
+below the false-alarm rate.  Whether it is one value (of the build), one a start, or one a log is
+tested by the likelihood ratio of separate against common values (for one parameter Cochran's Q);
+the simplest that is not refuted is said.
 Source: Cochran, Biometrics 10 (1954); Wilks (1938) for the ratio's chi-square.
 """
 
@@ -14,12 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
 from syncline_design.campaign.constants import ANOTHER
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
+from syncline_design.campaign.tries import tries_of
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.result import Scope
@@ -110,10 +112,16 @@ class Naming:
             found.append("log")
         return tuple(one for one in found if one in self.whole)
 
+    @cached_property
+    def tries(self) -> float:
+        """As how many independent tries all effects count, each one value in all logs."""
+        return tries_of(self.pool, self.terms, self.rate)
+
     def charge(self, scope: Scope) -> float:
         """log of how often chance was given a try."""
         total = sum(SHARE[one] for one in self.scopes)
-        return math.log(len(self.terms) * total / SHARE[scope])
+        tries = self.tries if scope == "build" else len(self.terms)
+        return math.log(tries * total / SHARE[scope])
 
     def named(self) -> NamedTogether:
         """The search."""

@@ -6,7 +6,8 @@ information, of the others with what is known of the constants, and g that of al
 are information and score of what is another in this run alone; of effects C
     d = W_CC^-1 u_C,   u_C' W_CC^-1 u_C ~ chi-square where nothing is,
 over the scatter inside runs and that between the others.  What differs from run to run anyway is
-freed, and Fisher's F of as many free values as the others have takes the place of chi-square then.
+freed, and Fisher's F of as many free values as the others have takes the place of chi-square then;
+of a few runs nobody knows that, and each effect is taken to differ by three bounds of a run.
 Two that are strange alike hide each other, so that the oddest are held against the others without
 one another, too.  A run is a stranger where the chance of that, times runs and effects
 (Bonferroni), is below its look's share of `RATE`: 2 / (n (n - 1)) after n runs, so that the chance
@@ -25,7 +26,7 @@ import numpy as np
 
 from syncline_design.campaign.changes import Changes, pseudo_inverse
 from syncline_design.campaign.pool import Index, Term, inverted
-from syncline_design.campaign.scatter import freed_of
+from syncline_design.campaign.scatter import APART, freed_of
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.judged import Judged, log_f
 from syncline_design.diagnosis.scores import log_p_of
@@ -38,6 +39,7 @@ MOST_TOLD: Final = 4  # effects of one run
 MOST_TRIED: Final = 4  # runs that seem odd before the scatter of the others is known
 PAIRED: Final = 3  # of them, of which two are looked at together
 FEWEST_OF_PAIRS: Final = 6  # runs
+SCATTER_KNOWN: Final = 8  # runs; before, an effect is taken to differ by APART from run to run
 AS_GOOD_NATS: Final = 2.0
 ALIKE_SPREADS: Final = 5.0  # standard uncertainties within which two strange runs are alike
 
@@ -173,14 +175,16 @@ def _held(changes: Changes, run: int, apart: tuple[int, ...]) -> Odd:
     temper = inside * np.array([between[t.label] for t in changes.terms])
     tries = changes.pool.count ** (1 + len(apart))
     return Odd(changes, normal[0] - normal[0] @ inverse @ normal[0], score[0] - normal[0] @ fit,
-               temper, tries, len(rest) - 1 if runs.freed else None)  # fmt: skip
+               temper, tries, len(rest) - 1 if runs.freed else None,
+               1.0 if changes.pool.count >= SCATTER_KNOWN else 1.0 + APART[-1] ** 2)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Odd:
     """What is another in one run alone: information W (P, P), score u (P,); temper: variance of
     each effect over that fitted, (C,).  tries: runs, or pairs of them, that were tried.  known:
-    free values by which the scatter of the others is known, where it was freed."""
+    free values by which the scatter of the others is known, where it was freed.  doubt: variance
+    over that again, where runs are too few to tell how an effect scatters."""
 
     changes: Changes
     normal: Array
@@ -188,6 +192,7 @@ class Odd:
     temper: Array
     tries: int
     known: int | None = None
+    doubt: float = 1.0
 
     @cached_property
     def charge(self) -> float:
@@ -201,7 +206,7 @@ class Odd:
         more = self.square((*beside, k)) - self.square(beside)
         if not free:
             return 0.0
-        square = max(more, 0.0) / float(self.temper[k])
+        square = max(more, 0.0) / float(self.doubt * self.temper[k])
         if self.known is not None:
             return log_f(square / free, free, self.known) + self.charge
         return log_p_of(square, free) + self.charge
@@ -251,4 +256,4 @@ class Odd:
     def _gain(self, k: int, taken: Sequence[int]) -> float:
         """What an effect explains, less its freedom [nat]."""
         more = self.square((*taken, k)) - self.square(taken)
-        return 0.5 * more / float(self.temper[k]) - self.changes.terms[k].size
+        return 0.5 * more / float(self.doubt * self.temper[k]) - self.changes.terms[k].size
