@@ -165,3 +165,18 @@ def test_inspection_proposes_the_points_as_ranges(tmp_path: Path) -> None:
     assert parts["position"] == parts["attitude"] == "sbet"
     streams = {"streams": {"ranging": "points", "position": "sbet", "attitude": "sbet"}}
     assert read(files, LogChoice.model_validate(streams)).kind == "georeference"
+
+
+def test_points_beside_a_table_of_places_want_their_own_trajectory(tmp_path: Path) -> None:
+    """A table may be of another vehicle: named as ranges, points are refused in words."""
+    files, _, _ = scanned(tmp_path)
+    table = tmp_path / "places.csv"
+    names = [f"position_{a}_m" for a in ("north", "east", "down")]
+    names += ["roll_deg", "pitch_deg", "yaw_deg"]
+    names += [f"reference_{a}_m" for a in ("north", "east", "down")]
+    rows = [",".join(["time_s", *names])]
+    rows += [f"{at},0,0,{-at},0,0,0,0,0,0" for at in range(30)]
+    table.write_text("\n".join(rows) + "\n", "utf-8")
+    choice = LogChoice.model_validate({"streams": {"ranging": "points"}})
+    with pytest.raises(BadInput, match="no recording beside it its trajectory"):
+        read([files[1], files[2], table], choice)

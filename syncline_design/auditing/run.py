@@ -47,7 +47,7 @@ class _Opened:
 
 def audit(paths: Sequence[Path]) -> Audit:
     """Audit all files; BadInput where none could be read."""
-    contents = ContentsBeside([one for path in paths for one in _files(path)])
+    contents = ContentsBeside([one for path in paths for one in files_of(path)])
     opened, refused, problems = _open(paths)
     if not opened:
         raise BadInput(tuple(flaw for error in problems for flaw in error.problems))
@@ -238,7 +238,7 @@ def _cannot_show(one: Examined, two: TwoTimes) -> tuple[str, ...]:
     """What these stamps leave open, in words."""
     names = {f.fault for f in one.faults}
     if one.series.receive is None:
-        return ("offset, drift, steps and delays: the file tells one time only",)
+        return (f"offset, drift, steps and delays: {_why_one_time(one.stream)}",)
     said = []
     if one.copied:
         said.append("anything of transport: every receipt is a copy of its stamp, whose rhythm is "
@@ -278,6 +278,14 @@ def _cannot_show(one: Examined, two: TwoTimes) -> tuple[str, ...]:
     return tuple(said)
 
 
+def _why_one_time(stream: Stream) -> str:
+    stamps = stream.stamps
+    if stamps is None or stamps.secondary is None:
+        return "the file tells one time only"
+    return (f"{stamps.primary} and {stamps.secondary} are of one clock, which cannot be held "
+            "against itself, and the file does not tell when a message was received")  # fmt: skip
+
+
 def _notes(rows: Sequence[StreamAudit]) -> tuple[str, ...]:
     notes = []
     if any(row.residual_s.bound is not None for row in rows):
@@ -287,7 +295,7 @@ def _notes(rows: Sequence[StreamAudit]) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _files(path: Path) -> list[Path]:
+def files_of(path: Path) -> list[Path]:
     """A file, or every file of a bag's folder; none of a folder that may not be read."""
     if not path.is_dir():
         return [path]
@@ -299,5 +307,5 @@ def _files(path: Path) -> list[Path]:
 
 def _evidence(opened: Sequence[_Opened], contents: ContentsBeside) -> tuple[FileRead, ...]:
     """The files that were opened, by their contents."""
-    read = {str(one) for o in opened for one in _files(o.path)}
+    read = {str(one) for o in opened for one in files_of(o.path)}
     return tuple(one for one in contents.reads() if one.file in read)

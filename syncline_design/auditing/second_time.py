@@ -19,6 +19,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 _ROUNDED_S: Final = 1e-6  # seconds since 1970 as 64-bit floats lie 0.24 us apart; no host's wait
 # for a message keeps to within this
+_DIGITS: Final = 10  # after the point: stamps are whole nanoseconds, less is arithmetic
 _LEAST: Final = 20  # messages that tell either
 _SAMPLE: Final = 100_000  # messages that tell a resolution
 
@@ -57,7 +58,7 @@ def _uneven(when: Array, pace: Cadence) -> float | None:
     over = counted_over_gaps(when)
     ways = [np.concatenate([[0.0], np.cumsum(pace.steps)])]
     ways.append(np.arange(when.size, dtype=np.float64) if over is None else over)
-    least = min(_about_line(counts, when) for counts in ways)
+    least = round(min(_about_line(counts, when) for counts in ways), _DIGITS)
     return least if least < pace.period_s else None
 
 

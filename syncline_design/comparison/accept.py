@@ -33,6 +33,7 @@ from syncline_design.comparison.evidence_files import (
 )
 from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.log_evidence import LogEvidence
+from syncline_design.comparison.of_places import as_of_places, stamps_alone
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.comparison.shapes import once_changed
 from syncline_design.comparison.stamp_meaning import held_against
@@ -42,6 +43,7 @@ from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
+from syncline_design.spec.load import BadInput
 from syncline_design.verdict.measured import coverage_of
 from syncline_design.verdict.pinned import as_measured
 from syncline_design.verdict.settings import CheckSettings
@@ -65,11 +67,15 @@ class AcceptSettings:
 
 @dataclass(frozen=True, slots=True)
 class _Evidence:
-    """Studies of clocks by what they tell of, the audit of stamps, the measured log's diagnosis."""
+    """Studies of clocks by what they tell of, the audit of stamps, the measured log's diagnosis.
+
+    no_places: why recordings were read for their stamps alone; "" where they were not.
+    """
 
     clocks: Mapping[str, TimingStudy]
     stamps: Audit | None
     log: LogEvidence | None
+    no_places: str = ""
 
 
 def accept(
@@ -86,6 +92,8 @@ def accept(
     every = assumptions(case, verdict, files.clocks)
     rests_on = [one for one in every if one.name in settings.asked]
     evidence = _evidence(case, files, settings, rests_on, seed)
+    if evidence.no_places:
+        files = replace(files, places=())
     in_force().doing("weighing the evidence")
     single = tuple(_row(case, one, evidence, seed) for one in rests_on)
     rows, groups = _in_groups(case, single, every, evidence)
@@ -130,21 +138,31 @@ def _evidence(
     audited = None
     if files.stamps and "timing" in settings.asked:
         audited = held_against(audit(files.stamps), case, seed)
-    return _Evidence(studies, audited, _diagnosed(case, files, settings, rests_on, seed))
+    log = _diagnosed(case, files, settings, rests_on, seed)
+    if isinstance(log, str):
+        return _Evidence(studies, audited, None, log)
+    return _Evidence(studies, audited, log)
 
 
 def _diagnosed(
     case: Case, files: EvidenceFiles, settings: AcceptSettings, rests_on: Sequence[Assumed],
     seed: int,
-) -> LogEvidence | None:  # fmt: skip
-    """Of the measured logs given, or of those that the spec names where they are asked for."""
+) -> LogEvidence | str | None:  # fmt: skip
+    """Of the measured logs given, or of those that the spec names where they are asked for; why
+    recordings tell of stamps alone, where they do."""
     wanted = any(name not in CLOCKS for name in settings.asked)
     places = [path for path in files.places if wanted or path not in files.stamps]
     named = case.spec.log is not None and bool(case.spec.log.files)
     if not places and not (wanted and named):
         return None
-    pinned = as_measured(case, seed)
-    sight = sighted(pinned, places, DiagnosisSettings(seed=seed, unseen_block=False))
+    pinned = as_of_places(as_measured(case, seed), places)
+    try:
+        sight = sighted(pinned, places, DiagnosisSettings(seed=seed, unseen_block=False))
+    except BadInput:
+        why = stamps_alone(case, places, files.stamps) if "timing" in settings.asked else ""
+        if not why:
+            raise
+        return why
     sight = replace(sight, found=once_changed(sight.found))
     paper = OnPaper.beside(pinned, sight.found, seed)
     return LogEvidence.of(sight, paper, case.stages[-1].choice.name, _clocks(case, rests_on))
@@ -195,6 +213,8 @@ def _notes(verdict: Verdict, evidence: _Evidence) -> Iterator[str]:
         yield from (f"clock of {name}: {note}" for note in study.timing.notes)
     if evidence.stamps is not None:
         yield from evidence.stamps.notes
+    if evidence.no_places:
+        yield evidence.no_places
     if evidence.log is not None:
         yield from evidence.log.found.log.notes
         yield from (c.message for c in evidence.log.found.checks)

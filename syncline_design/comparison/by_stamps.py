@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Final
 
 from syncline_design.auditing.result import Audit, StampFault, StreamAudit
+from syncline_design.auditing.stream import is_receipt
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_clock import LONGER
@@ -43,9 +44,20 @@ def by_stamps(one: Assumed, found: Audit, horizon_s: float) -> Judgement | None:
         return Judgement("not_shown", f"stream {stream.name}: its receipts say nothing: {words}")
     late = any(fault.fault == _LATE for fault in stream.faults)
     size = stream.residual_s.as_recorded if late else stream.residual_s.bound
-    if stream.stamps.secondary is None or size is None:
-        return Judgement("not_shown", f"stream {stream.name} has one time a message")
+    if not is_receipt(stream.stamps.secondary) or size is None:
+        return Judgement("not_shown", f"stream {stream.name} {_lacks(stream)}")
     return _sound(one.value, stream, _apart(stream, size), horizon_s)
+
+
+def _lacks(stream: StreamAudit) -> str:
+    """Why nothing is known of its receipts."""
+    first, second = stream.stamps.primary, stream.stamps.secondary
+    if second is None or first is None:
+        return "has one time a message"
+    if is_receipt(second):
+        return "keeps no rhythm that would tell how late its stamps on arrival are"
+    return (f"has two times a message, {first} and {second}, which one clock told, and no receipt: "
+            "it cannot be held against itself")  # fmt: skip
 
 
 def _apart(stream: StreamAudit, size: float) -> float:

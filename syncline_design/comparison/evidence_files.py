@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from syncline_design.auditing.run import files_of
 from syncline_design.clocks.reading import is_clock_log, read_logs
 from syncline_design.comparison.acceptance import EvidenceFile, ReadAs
 from syncline_design.logs import delimited
@@ -32,8 +33,8 @@ class EvidenceFiles:
         """Every file as it is written, once for each way in which it was read."""
         for name, paths in self.clocks.items():
             yield from (_record(path, "clock", name) for path in paths)
-        yield from (_record(path, "stamps") for path in self.stamps)
-        yield from (_record(path, "log") for path in self.places)
+        yield from (_record(one, "stamps") for path in self.stamps for one in files_of(path))
+        yield from (_record(one, "log") for path in self.places for one in files_of(path))
 
 
 def evidence_files(
@@ -138,7 +139,7 @@ def demand_own_clocks(case: Case, clocks: Mapping[str, Sequence[Path]]) -> None:
 
 
 def _record(path: Path, read_as: ReadAs, of: str = "") -> EvidenceFile:
-    """With the file's SHA-256; of a folder none."""
+    """With the file's SHA-256; "" of one that cannot be read."""
     digest = ""
     if path.is_file():
         with path.open("rb") as stream:

@@ -30,7 +30,7 @@ from syncline_design.logs.row_source import RowSource
 from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.sources import demand_plain_file, opened
 from syncline_design.logs.static_arms import arm_notes, arms_beside
-from syncline_design.logs.stream_sources import sources_of
+from syncline_design.logs.stream_sources import demand_parts, sources_of
 from syncline_design.logs.surveys import Survey, first_survey
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
@@ -213,3 +213,31 @@ def _quantities(path: Path) -> frozenset[str]:
     """What the columns tell, with times, under the names that readers know."""
     streams = open_recording(path).streams()
     return frozenset(what for one in streams if one.stamps for what in one.quantity)
+
+
+def no_places_in(paths: Sequence[Path], choice: LogChoice, stages: Sequence[str]) -> str:
+    """Why recordings, whose streams are there as the spec names them, tell no places that could be
+    held against anything; "" where they do, or where a name is wrong.
+
+    A stream that the spec names for its stamps alone (a scan) is no fault of the recording.
+    """
+    files = sorted_files(paths, choice.columns, stages)
+    if not files.recordings:
+        return ""
+    offers = some_offers(one_run([open_recording(path) for path in files.recordings]))
+    known = {name for o in offers for name in (o.name, o.path.name, o.path.stem)}
+    known |= {f"{o.path.name}:{o.name}" for o in offers}
+    left = without_tables(choice, files, offers)
+    if any(name is not None and name not in known for name in left.streams.model_dump().values()):
+        return ""
+    try:
+        demand_parts(offers, left, files.held)
+    except BadInput as error:
+        return error.problems[0].message
+    return ""
+
+
+def tells_all(paths: Sequence[Path], choice: LogChoice, stages: Sequence[str]) -> bool:
+    """Whether the tables among files are a measured log of their own."""
+    held = sorted_files(paths, choice.columns, stages).held
+    return {"position", "attitude"} <= held and bool(held & {"ranging", "reference"})

@@ -118,13 +118,21 @@ def _named(offers: Sequence[Offer], role: Role, name: str) -> Offer:
             f"{name} holds no {quantity}",
             field=f"log.streams.{role}",
             found=", ".join(same[0].stream.quantity) or "nothing that is read",
+            hint="`syncline-design log inspect` lists what each stream holds; its stamps alone are "
+            "for `audit`, and for the row `timing` of `accept`",
         )
     return max((o for o in same if _plays(o, role)), key=lambda o: o.stream.messages)
 
 
 def _plays(offer: Offer, role: Role) -> bool:
-    """Whether a stream measures what a part needs; a cloud's points are as good as ranges."""
-    return offer.has(NEEDED[role]) or (role == "ranging" and offer.has("points"))
+    """Whether a stream measures what a part needs; a cloud's points are as good as ranges, where
+    they are read as places (of a scan in a bag the stamps alone are)."""
+    return offer.has(NEEDED[role]) or (role == "ranging" and is_cloud(offer))
+
+
+def is_cloud(offer: Offer) -> bool:
+    """Whether a stream's points have places."""
+    return offer.has("points") and "point_x_m" in offer.stream.columns
 
 
 Chooser = Callable[[Sequence[Offer], Mapping[Role, Part], Sequence[Path]], Part | None]
@@ -253,7 +261,7 @@ def _of_reference(role: Role) -> Chooser:
 
 def _cloud(offers: Sequence[Offer]) -> Part | None:
     """Points as ranges, where a trajectory with attitudes lies beside."""
-    clouds = [o for o in offers if o.has("points") and "point_x_m" in o.stream.columns]
+    clouds = [o for o in offers if is_cloud(o)]
     told = [o for o in offers if o.has("position") and o.has("attitude")]
     ranged = any(o.has("ranging") for o in offers)
     if ranged or not clouds or not told:

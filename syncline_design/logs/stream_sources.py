@@ -91,8 +91,7 @@ def sources_of(
     of two trajectories both places and attitudes are compared.  held: parts that other files play.
     survey, arms: of targets and of the vehicle, for ranges that a cloud's points tell.
     """
-    parts = left_of(parts_of(offers, choice, surveyed="target" in held), held)
-    _demand_parts(offers, {*parts, *held})
+    parts = demand_parts(offers, choice, held)
     pair = poses and is_pose_pair(parts)
     if pair:
         parts = _of_the_tested(parts)
@@ -108,7 +107,8 @@ def sources_of(
     if "reference" in parts and "position" in parts:
         turns = in_one_frame(parts, values, choice, pair, arms[1])
     ranging = parts.get("ranging")
-    if ranging is not None and ranging.offer.has("points") and not ranging.offer.has("ranging"):
+    if ranging is not None and not ranging.offer.has("ranging"):
+        _demand_trajectory(ranging.offer, parts)
         cloud, place, turn = (values[id(parts[r].offer)] for r in _OF_A_CLOUD)
         with_ranges(cloud, place, turn, choice, survey, arms)
     return [
@@ -152,6 +152,16 @@ def left_of(parts: Mapping[Role, Part], held: frozenset[Role]) -> dict[Role, Par
     return kept
 
 
+def demand_parts(
+    offers: Sequence[Offer], choice: LogChoice, held: frozenset[Role]
+) -> dict[Role, Part]:
+    """The parts that recordings play beside those that other files do (held); refused where a
+    diagnosis lacks one."""
+    parts = left_of(parts_of(offers, choice, surveyed="target" in held), held)
+    _demand_parts(offers, {*parts, *held})
+    return parts
+
+
 def _demand_parts(offers: Sequence[Offer], parts: set[Role]) -> None:
     path = offers[0].path
     if "position" not in parts:
@@ -174,6 +184,17 @@ def _demand_parts(offers: Sequence[Offer], parts: set[Role]) -> None:
             "no stream of attitudes",
             expected="attitudes of the vehicle, to lay lever arms along",
             hint="name one: log: {streams: {attitude: NAME}}",
+        )
+
+
+def _demand_trajectory(cloud: Offer, parts: Mapping[Role, Part]) -> None:
+    """Points become ranges by the trajectory that they were made with; a table's may be another."""
+    if not {"position", "attitude"} <= parts.keys():
+        raise refuse(
+            cloud.path,
+            f"{cloud.name} tells places of points, and no recording beside it its trajectory",
+            expected="places and attitudes in one file, such as an SBET",
+            hint="name no `ranging` in log: {streams: ...} where a table's columns tell the ranges",
         )
 
 

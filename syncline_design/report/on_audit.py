@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Final
 
 from syncline_design.auditing.result import Audit, StampFault, StreamAudit
+from syncline_design.auditing.stream import is_receipt
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,
@@ -235,7 +236,7 @@ def _streams(result: Audit) -> Table:
             Cell(numbers.number(row.rate_hz, 4), row.rate_hz),
             row.shape,
             row.stamps.primary or "none",
-            row.stamps.secondary or "none",
+            _receipt(row),
             row.timeline,
             Cell(numbers.time(row.offset_s), row.offset_s),
             ", ".join(dict.fromkeys(f.fault for f in row.faults)),
@@ -245,6 +246,12 @@ def _streams(result: Audit) -> Table:
     heads = ("Stream", "Messages #", "Rate [Hz] #", "Rhythm", "Stamp", "Receipt", "Timeline",
              "Stamp \N{MINUS SIGN} receipt #", "Faults")  # fmt: skip
     return table("Streams", heads, rows)
+
+
+def _receipt(row: StreamAudit) -> str:
+    """What the file calls its receipts; a second time of the stamps' own clock is none."""
+    second = row.stamps.secondary
+    return f"none ({second}: same clock)" if second and not is_receipt(second) else second or "none"
 
 
 def _named(row: StreamAudit) -> Cell:
