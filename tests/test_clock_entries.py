@@ -159,6 +159,20 @@ def test_an_entry_without_a_digest_is_taken_with_a_caution(tmp_path: Path) -> No
     assert run("catalog", "check", entry).exit_code == 0
 
 
+def test_a_bound_that_its_own_values_contradict_is_not_measured(tmp_path: Path) -> None:
+    """Typed anew, the digest taken out: 12 us hold a tenth of offsets of 0.1 ms, not 95 %."""
+    entry = entry_of_a_week(tmp_path)
+    lines = entry.read_text("utf-8").splitlines(keepends=True)
+    text = "".join(one for one in lines if "digest: " not in one)
+    entry.write_text(text.replace(f"bound: {bound_of(entry)}", "bound: 12 us"), "utf-8")
+    told = checked(tmp_path)
+    (caution,) = [one for one in told["warnings"] if one["code"].startswith("measured")]
+    assert caution["code"] == "measured-altered"
+    assert "of its own values lie within its bound" in caution["message"]
+    assert "measured" not in told
+    assert run("catalog", "check", entry).exit_code == 1
+
+
 def test_a_log_that_changed_since_is_said(tmp_path: Path) -> None:
     entry_of_a_week(tmp_path)
     log = next(iter(sorted(tmp_path.glob("run*.csv"))))
@@ -271,3 +285,12 @@ def test_an_entry_has_its_own_id_and_the_spec_s_currency(tmp_path: Path) -> None
     assert done.exit_code == 0, done.stderr
     spec.write_text(dollars, "utf-8")
     assert check_loaded(load(spec), CheckSettings(monte_carlo=False)).verdict == "meets"
+
+
+@pytest.mark.parametrize("identity", ["Odd-X", "my.clock", "a__b", "9", "x" * 81])
+def test_no_entry_is_written_by_an_id_that_catalogs_refuse(tmp_path: Path, identity: str) -> None:
+    logs = week_of_logs(tmp_path, 1e-4)
+    entry = tmp_path / "own.yaml"
+    done = run("timing", *logs, "--as", identity, "--write-catalog", entry)
+    assert (done.exit_code, done.stdout, entry.exists()) == (2, "", False)
+    assert "not an id; expected lower case" in done.stderr

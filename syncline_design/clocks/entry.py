@@ -20,7 +20,8 @@ from syncline_design.spec.load import load_builtin
 from syncline_design.spec.timestamp_errors import read_error
 from syncline_design.spec.yaml_text import parse
 
-_ID: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,79}")
+# as `catalog check` wants ids: specs name them for years
+_ID: Final = re.compile(r"(?=.{1,80}\Z)[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 _SECTIONS: Final[dict[ClockEntryKind, str]] = {"clock": "clocks", "timestamping": "timestamping"}
 _KEYS: Final[dict[ClockEntryKind, str]] = {"clock": "offset", "timestamping": "error"}
 _MOST_EVENTS: Final = 20
@@ -44,7 +45,7 @@ def entry_files(identity: str, catalog: Path | None) -> EntryFiles:
     """Where an entry goes; refused for an id that no catalog takes, or a file of somebody else."""
     if not _ID.fullmatch(identity):
         raise refused(Path(f"--as {identity[:40]}"), "not an id",
-                      expected="letters, digits, _ . - and a letter first")  # fmt: skip
+                      expected="lower case, such as maker_clock_2")  # fmt: skip
     known = load_builtin()
     if any(identity in getattr(known, section) for section in _SECTIONS.values()):
         raise refused(Path(f"--as {identity}"), "a built-in catalog has an entry of that id",

@@ -32,7 +32,7 @@ from syncline_design.spec.facts import (
 )
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import Collection, add_builtin, add_file, published_ids
-from syncline_design.spec.measured import ALTERED, MeasuredKeys
+from syncline_design.spec.measured import MeasuredKeys
 from syncline_design.spec.references import unknown_requirements
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
@@ -278,8 +278,8 @@ def _altered(one: _Place) -> Iterator[CatalogFlaw]:
     """Entries that say that they were measured, and whose figures are not what was."""
     for key in ("error", "offset"):
         error = getattr(one.entry, key, None)
-        if isinstance(error, MeasuredKeys) and error.seal == "differs":
-            yield one.finding("measured", key, "not as it was measured", ALTERED)
+        if isinstance(error, MeasuredKeys) and (why := error.why_not_measured):
+            yield one.finding("measured", key, "not as it was measured", why)
 
 
 def _sizes(every: Sequence[_Place]) -> Mapping[tuple[str, str, str], list[float]]:

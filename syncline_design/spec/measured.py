@@ -14,6 +14,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
+from syncline_design.model.figure_text import percent
 from syncline_design.spec.fields import (
     Count,
     FileRecord,
@@ -33,6 +34,7 @@ ALTERED: Final = (
 Seal = Literal["fits", "differs", "none"]
 # keys that are no figure of a measurement: the digest itself, where values and logs lie, words
 _NO_FIGURE: Final = frozenset({"digest", "file", "conditions"})
+_THINNED: Final = 0.02  # what quantiles in a file leave out of the share that they stand for
 _SHA256: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -120,6 +122,24 @@ class MeasuredKeys(FileRecord):
         if self.digest is None:
             return "none"
         return "fits" if self.digest == self.figures_sha256 else "differs"
+
+    @property
+    def why_not_measured(self) -> str:
+        """Why figures that are said to be measured are not taken so; "" where they are.
+
+        A bound that holds for a share of every session holds for as much of all values together.
+        """
+        if self.seal == "differs":
+            return ALTERED
+        values = getattr(self, "values", None)
+        if not values or self.bound is None or self.claim is None:
+            return ""
+        within = sum(abs(one) <= self.bound for one in values) / len(values)
+        if within >= self.claim.coverage - _THINNED:
+            return ""
+        return (f"{percent(within, 3)} of its own values lie within its bound, where its claim is "
+                f"of {percent(self.claim.coverage, 4)} of the time: measure again with timing --as"
+                )  # fmt: skip
 
     @property
     def is_measured(self) -> bool:

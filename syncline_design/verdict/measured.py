@@ -11,7 +11,7 @@ from syncline_design.model.figure_text import format_duration, percent, to_digit
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry, TimestampingEntry
 from syncline_design.spec.exact import tau_bound
-from syncline_design.spec.measured import ALTERED, MeasuredClaim, changed_logs
+from syncline_design.spec.measured import MeasuredClaim, changed_logs
 from syncline_design.spec.timestamp_errors import TimestampError
 from syncline_design.verdict.design_data import UsedEntry
 from syncline_design.verdict.tree import Caution, ClaimShown, MeasuredEntry
@@ -46,7 +46,7 @@ def measured(case: Case, entries: Sequence[UsedEntry]) -> tuple[MeasuredEntry, .
             error.conditions or "", tuple(FileRead(one.file, one.sha256) for one in error.evidence),
             sum(event.count or 1 for event in error.events),
         )
-        for used, error in _errors(entries) if error.seal != "differs"
+        for used, error in _errors(entries) if not error.why_not_measured
     )  # fmt: skip
     return found or None
 
@@ -93,8 +93,8 @@ def claim_cautions(case: Case, entries: Sequence[UsedEntry]) -> Iterator[Caution
     """What a verdict takes from a measurement beyond what that claims."""
     for used, error in _errors(entries):
         key = "error" if used.section == "timestamping" else "offset"
-        if error.seal == "differs":
-            yield Caution("measured-altered", f"{used.id} is NOT taken as measured: {ALTERED}",
+        if why := error.why_not_measured:
+            yield Caution("measured-altered", f"{used.id} is NOT taken as measured: {why}",
                           entry=used.id, key=key)  # fmt: skip
             continue
         if error.seal == "none":
