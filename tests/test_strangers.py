@@ -213,3 +213,21 @@ def test_rows_that_a_run_lost_are_said(spec: Path, tmp_path: Path) -> None:
         store = kept(spec, tmp_path, runs[:count])
         assert told(spec, store, tmp_path, 0)["cautions"] == said
         store.unlink()
+
+
+def test_two_strange_runs_are_both_named_and_left_out(spec: Path, tmp_path: Path) -> None:
+    """One by 20 bounds and the next by as much to the other side: neither is a change undone."""
+    runs = with_odd(14, 6, 3)
+    rng = np.random.default_rng(14)
+    base = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+    rng = np.random.default_rng(140)
+    runs[4] = run_of(statistics(rng, base - OTHER), 4)
+    runs += [run_of(statistics(rng, base), k) for k in range(6, 10)]
+    store = kept(spec, tmp_path, runs)
+    assert {one["number"] for one in told(spec, store, tmp_path, 1)["unlike"]} == {4, 5}
+    said = " ".join(watch(store, spec).output.split())
+    assert "Runs 4 and 5 are unlike the others" in said
+    assert "--leave-out N --reason TEXT counts each of these runs no more" in said
+    for run in ("4", "5"):
+        assert watch(store, "--leave-out", run, "--reason", "another vehicle").exit_code == 0
+    told(spec, store, tmp_path, 0)

@@ -14,8 +14,11 @@ from syncline_design.campaign.oddities import _differing
 from syncline_design.campaign.pool import Pool, Scoped, fitted, pool_of
 from syncline_design.campaign.store import add_run, read_store
 from syncline_design.campaign.unlike import _difference, unlike_logs
+from syncline_design.diagnosis.finding import estimate
+from syncline_design.diagnosis.result import UnlikeOthers
 from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.diagnosis.system import pinned_system
+from syncline_design.report.on_joint import unlike_words
 from syncline_design.spec.load import BadInput, load
 from tests.test_joint import UNITS, made, statistics
 from tests.watched_series import BOUND, car_spec, kept, run_of, series, told, watch
@@ -69,6 +72,18 @@ def test_what_a_log_differs_by_is_known_though_neither_value_is() -> None:
     whole = pool_of([statistics(*one) for one in rows], list(range(4)))
     (one,) = unlike_logs(whole, [t for t in whole.terms if t.label[0] == "latency"])
     assert (one.run, one.term.label[0]) == (2, "latency")
+
+
+def test_the_parts_of_one_vector_are_told_in_one_unit() -> None:
+    """A centimetre beside a part that is nearly nothing: no `-148 ± 3540 µm`."""
+    names = ("x_m", "y_m", "z_m")
+    figures = ((0.296, 0.010), (-0.205, 0.003), (-0.000148, 0.00354))
+    differs = {n: estimate(v, s, "m") for n, (v, s) in zip(names, figures, strict=True)}
+    one = UnlikeOthers(4, ("d.csv",), "lever_arm", "position", "car", differs, -12.0)
+    said = unlike_words(one)
+    assert "x by 29.6 ± 1.0 cm, y by -20.5 ± 0.3 cm and z by 0.0 ± 0.4 cm" in said.replace(
+        "-0.0", "0.0"
+    )
 
 
 def test_another_value_in_every_log_is_no_odd_one() -> None:

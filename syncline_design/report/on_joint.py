@@ -8,7 +8,7 @@ from typing import Final
 
 from syncline_design.diagnosis.result import Estimate, Finding, Joint, LogAlone, UnlikeOthers
 from syncline_design.machine.sentences import sentence_list
-from syncline_design.model.figure_text import format_chance, format_estimates
+from syncline_design.model.figure_text import format_chance, format_components, format_estimates
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
@@ -96,8 +96,11 @@ def latest(
 
 def unlike_words(one: UnlikeOthers) -> str:
     """`log 4 (d.csv) is unlike the others: latency (position) differs there by ...`."""
-    parts = [f"{split_suffix(name)[0].replace('_', ' ')} by {own.text}"
-             for name, own in one.differs.items() if own.seen]  # fmt: skip
+    seen = {name: (own.value, own.standard_uncertainty, own.unit)
+            for name, own in one.differs.items()
+            if own.seen and not isinstance(own.value, str)}  # fmt: skip
+    parts = [f"{split_suffix(name)[0].replace('_', ' ')} by {text}"
+             for name, text in format_components(seen).items()]  # fmt: skip
     what = f"{one.effect.replace('_', ' ')} ({one.sensor})"
     return (
         f"log {one.number} ({', '.join(one.files)}) is unlike the others: {what} differs there, "

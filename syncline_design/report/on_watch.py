@@ -134,11 +134,12 @@ def _sentences(found: Watch) -> Iterator[Inline]:
     for one in found.alarms:
         yield _sentence(one)
     if found.alarms:
-        lone = next((one.since.run for one in found.alarms if one.alone), None)
-        out = f"watch STORE --leave-out {lone} --reason TEXT"
+        lone = list(dict.fromkeys(one.since.run for one in found.alarms if one.alone))
+        out = f"watch STORE --leave-out {lone[0] if len(lone) == 1 else 'N'} --reason TEXT"
+        which = "the run" if len(lone) == 1 else "each of these runs"
         yield (
             "The alarm stays until ",
-            *([code(out), " counts the run no more, or "] if lone is not None else ()),
+            *([code(out), f" counts {which} no more, or "] if lone else ()),
             code("watch STORE --accept"),
             " makes a new baseline: after a repair, or where the change is meant to stay.",
         )
