@@ -13,13 +13,16 @@ from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.spec.load import BadInput, load
 from tests.acceptance_samples import ROOT, run
 from tests.clock_logs import (
+    gpsd_line,
     phc2sys_line,
+    ppstest_line,
     ptp4l_line,
     refclock_lines,
     sessions_csv,
     statistics_line,
     tracking,
     tracking_line,
+    ts2phc_line,
     write,
 )
 
@@ -66,7 +69,7 @@ def test_clock_logs_against_the_clock_of_the_spec(
     folder = clocked.parent / "logs"
     folder.mkdir()
     logs = sessions_csv(folder, [sigma_s] * sessions, count=800, step_s=10.0)
-    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    done = run("accept", clocked, *logs, "--only", "clock", "--independent", "-o", "json:-")
     result = json.loads(done.stdout)
     assert (done.exit_code, result["verdict"]) == (code, status), done.stdout
     (row,) = result["assumptions"]
@@ -96,7 +99,7 @@ def test_the_log_of_a_clock_that_the_spec_does_not_name_counts(
     folder = clocked.parent / "logs"
     folder.mkdir()
     logs = sessions_csv(folder, [sigma_s] * sessions, count=800, step_s=10.0)
-    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    done = run("accept", clocked, *logs, "--only", "clock", "--independent", "-o", "json:-")
     (row,) = json.loads(done.stdout)["assumptions"]
     assert (row["assumption"], row["assumed"], row["status"]) == ("clock", 0.0, status), row
     assert words in row["evidence"]
@@ -150,7 +153,7 @@ def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
     folder.mkdir()
     logs = sessions_csv(folder, [1e-4] * 20, count=800, step_s=10.0)
     given = [part for log in logs for part in ("--assign", f"uav/position={log}")]
-    done = run("accept", clocked, *given, "--only", "timing", "-o", "json:-")
+    done = run("accept", clocked, *given, "--only", "timing", "--independent", "-o", "json:-")
     statuses = {row["role"]: row["status"] for row in json.loads(done.stdout)["assumptions"]}
     assert statuses == {"position": "holds", "attitude": "not_shown", "ranging": "not_shown"}
     assert done.exit_code == 3
@@ -175,7 +178,7 @@ def test_a_clock_that_steps_beyond_its_bound_now_and_then_is_not_borne_out(
         path = folder / f"run{k}.csv"
         path.write_text("\n".join(["time_s,offset_s", *rows]) + "\n", "utf-8")
         logs.append(path)
-    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    done = run("accept", clocked, *logs, "--only", "clock", "--independent", "-o", "json:-")
     (row,) = json.loads(done.stdout)["assumptions"]
     assert (row["status"], done.exit_code) == (status, code), row
 
@@ -185,7 +188,7 @@ def test_sessions_shorter_than_the_horizon_bear_nothing_out(clocked: Path) -> No
     folder = clocked.parent / "logs"
     folder.mkdir()
     logs = sessions_csv(folder, [1e-4] * 8, count=400, step_s=5.0)
-    asked = ("--only", "clock", "-o", "json:-")
+    asked = ("--only", "clock", "--independent", "-o", "json:-")
     done = run("accept", clocked, *logs, *asked)
     (row,) = json.loads(done.stdout)["assumptions"]
     assert (row["status"], done.exit_code) == ("not_shown", 3)
@@ -199,7 +202,7 @@ def test_few_sessions_that_keep_a_bound_do_not_break_it(clocked: Path) -> None:
     folder = clocked.parent / "logs"
     folder.mkdir()
     logs = sessions_csv(folder, [1e-5, 3e-5, 2e-4], count=800, step_s=10.0)
-    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    done = run("accept", clocked, *logs, "--only", "clock", "--independent", "-o", "json:-")
     (row,) = json.loads(done.stdout)["assumptions"]
     assert row["measured"]["value"] > row["assumed"] == 1e-3
     assert (row["status"], done.exit_code) == ("not_shown", 3), row
@@ -214,6 +217,27 @@ def pulse(time_s: float, late_s: float) -> str:
     return "\n".join(refclock_lines(time_s, late_s))
 
 
+_INIT = "port 1: INITIALIZING to LISTENING on INIT_COMPLETE"
+
+
+def card(time_s: float, late_s: float) -> str:
+    """Each time from the start of ptp4l on."""
+    if time_s % 86400.0 > 1e3:
+        return ptp4l_line(time_s, late_s)
+    at = f"ptp4l[{time_s - 1.0:.3f}]:"
+    lines = [f"{at} selected /dev/ptp0 as PTP clock", f"{at} {_INIT}", ptp4l_line(time_s, late_s)]
+    return "\n".join(lines)
+
+
+def software(time_s: float, late_s: float) -> str:
+    """No card is opened: the system clock is what ptp4l steers."""
+    return "\n".join(line for line in card(time_s, late_s).split("\n") if "/dev/ptp" not in line)
+
+
+def by_pulse(time_s: float, late_s: float) -> str:
+    return tracking_line(time_s, late_s, reference="PPS", delay_s=1e-9)
+
+
 @pytest.mark.parametrize(
     ("line", "start_s", "status"),
     [
@@ -221,7 +245,13 @@ def pulse(time_s: float, late_s: float) -> str:
         pytest.param(tracking_line, 1.8e9, "holds", id="half the round trip"),
         pytest.param(pulse, 1.8e9, "not_shown", id="the delay of a pulse"),
         pytest.param(phc2sys_line, 1e3, "not_shown", id="the card's own error"),
-        pytest.param(ptp4l_line, 1e3, "holds", id="the path to the card"),
+        pytest.param(ptp4l_line, 1e3, "not_shown", id="of a card or of the host"),
+        pytest.param(card, 1e3, "not_shown", id="the path to the card alone"),
+        pytest.param(software, 1e3, "holds", id="the path to the host by its own time stamps"),
+        pytest.param(ts2phc_line, 1e3, "not_shown", id="a card by the pulse that steers it"),
+        pytest.param(ppstest_line, 1.8e9, "not_shown", id="a pulse that may steer"),
+        pytest.param(gpsd_line, 1.8e9, "not_shown", id="a pulse that may steer, by gpsd"),
+        pytest.param(by_pulse, 1.8e9, "not_shown", id="a pulse that the tracking log names"),
         pytest.param(chained, 1e3, "holds", id="the path to the card, and the card to the host"),
     ],
 )
@@ -240,8 +270,25 @@ def test_a_servo_that_nulls_its_own_offsets_bears_nothing_out(
     done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
     (row,) = json.loads(done.stdout)["assumptions"]
     assert row["status"] == status, row
-    said = "servo" in row["evidence"] or "the rest of the way" in row["evidence"]
+    reasons = ("servo's own", "the rest of the way", "of a card's clock", "may be what steers")
+    said = any(words in row["evidence"] for words in reasons)
     assert said is (status == "not_shown")
+
+
+@pytest.mark.parametrize("role", ["uav", "uav/position"])
+def test_a_card_s_own_clock_is_what_stamps_of_a_card_stand_on(clocked: Path, role: str) -> None:
+    """Of a sensor that is stamped by its card ptp4l tells; of the host's clock it does not."""
+    folder, given = clocked.parent / "logs", []
+    folder.mkdir()
+    for k in range(8):
+        times = 1e3 + 86400.0 * k + 16.0 * np.arange(400)
+        late = 1e-5 * np.random.default_rng(k).normal(size=400)
+        rows = [card(t, x) for t, x in zip(times, late, strict=True)]
+        given += ["--assign", f"{role}={write(folder / f'{k}.log', rows)}"]
+    done = run("accept", clocked, *given, "--only", "clock,timing", "-o", "json:-")
+    rows = {row["role"]: row["status"] for row in json.loads(done.stdout)["assumptions"]}
+    asked = {"uav": "clock", "uav/position": "position"}[role]
+    assert rows[asked] == {"clock": "not_shown", "position": "holds"}[asked]
 
 
 def stamped(path: Path, fault_s: float, early_s: float = 0.0, transport_s: float = 1e-4) -> Path:
@@ -370,8 +417,9 @@ def test_a_spec_that_fails_on_paper_is_not_accepted(clocked: Path) -> None:
     folder = clocked.parent / "logs"
     folder.mkdir()
     logs = sessions_csv(folder, [1e-4] * 20, count=800, step_s=10.0)
-    done = run("accept", clocked, *logs, "--only", "clock")
+    done = run("accept", clocked, *logs, "--only", "clock", "--independent")
     assert done.exit_code == 1
     assert "does not meet its requirements on paper" in done.stdout
-    result = json.loads(run("accept", clocked, *logs, "--only", "clock", "-o", "json:-").stdout)
+    told = run("accept", clocked, *logs, "--only", "clock", "--independent", "-o", "json:-")
+    result = json.loads(told.stdout)
     assert (result["verdict"], result["broken_by"]) == ("broken", ["spec"])

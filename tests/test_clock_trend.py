@@ -25,7 +25,7 @@ def _timing(folder: Path, late_us: np.ndarray, scatter_us: float = 2.0) -> Timin
         times = START + 86400.0 * k + 30.0 * np.arange(60)
         late = 1e-6 * (level + source.normal(0.0, scatter_us, 60))
         paths.append(write(folder / f"day{k}.csv", csv_lines(times, late)))
-    return study_logs(paths, TimingSettings())
+    return study_logs(paths, TimingSettings(independent=True))
 
 
 def _said(folder: Path, late_us: np.ndarray) -> list[str]:

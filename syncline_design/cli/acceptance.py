@@ -45,6 +45,9 @@ def accept(
         str | None,
         typer.Option(metavar="NAMES", help="Assumptions to ask for: timing,latency; default: all."),
     ] = None,
+    independent: Annotated[
+        bool, typer.Option("--independent", help="Offsets of clock logs do not steer the clocks.")
+    ] = False,
     output: AcceptOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
@@ -52,6 +55,7 @@ def accept(
 ) -> int:
     """Hold logs of the built system against everything that its verdict rests on."""
     deadline = deadline_of(time_limit)
+    from syncline_design.clocks.study import TimingSettings
     from syncline_design.comparison.accept import AcceptSettings
     from syncline_design.comparison.accept import accept as accept_logs
     from syncline_design.report.on_acceptance import (
@@ -64,7 +68,8 @@ def accept(
 
     assigned = _assigned(assign or [])
     reads = [spec, *(log or ()), *(path for paths in assigned.values() for path in paths)]
-    settings = AcceptSettings(_asked(only), assigned)
+    timing = TimingSettings(independent=independent)
+    settings = AcceptSettings(_asked(only), assigned, timing)
     targets = output_targets(output, ACCEPT_FORMATS, reads)
     with watched(deadline, targets, quiet=quiet):
         result = accept_logs(load(spec), log or (), settings, seed=seed)

@@ -22,6 +22,7 @@ _LEAPS: Final = frozenset("N+-?")
 _TESTS: Final = re.compile(r"[01]{3}")
 _DISTANT_SKEW: Final = 1e5  # ppm; chronyd starts with 1e6 where no drift file says better
 UNSET: Final = "0.0.0.0"
+ITSELF: Final = "127.127.1."  # chronyd's and ntpd's own clock as a reference
 _BANNER: Final = "===="
 _BANNER_EACH: Final = 32  # lines, by default (chrony.conf(5), logbanner)
 _CYCLE_S: Final = 3600.0  # lines with a banner between them and no longer apart are of one run
@@ -131,7 +132,8 @@ def _tracking(time_s: float, cells: list[str]) -> Row:
     locked = cells[7] != "?" and cells[2] != UNSET
     restart = not locked and skew >= _DISTANT_SKEW
     rate = 1e-6 * float(cells[4])
-    return Row(time_s, offset, hard, locked, rate, 1e-6 * skew, restart, hard >= _STARTING_S)
+    return Row(time_s, offset, hard, locked, rate, 1e-6 * skew, restart, hard >= _STARTING_S,
+               float(cells[3]), float(cells[8]))  # fmt: skip
 
 
 def _measurement(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str]:
@@ -140,7 +142,12 @@ def _measurement(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str]
     hard = (delay + root_delay) / 2.0 + dispersion + root_dispersion + abs(offset)
     good = "0" not in cells[5] + cells[6] and cells[3] != "?"
     kind = SourceKind(f"chrony measurements {cells[2]}", "chrony", 2, "servo", "utc", cells[2])
-    return kind, Row(time_s, -offset, hard, good), ""
+    return kind, Row(time_s, -offset, hard, good, stratum=float(cells[4]) + 1.0), ""
+
+
+def is_refclock(reference: str) -> bool:
+    """Whether a reference that a tracking log names is a clock of the host's own, and no server."""
+    return bool(reference) and not set(reference) & set(".:")
 
 
 def _refclock(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str] | None:

@@ -8,13 +8,17 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.clocks.chrony import ITSELF
+from syncline_design.clocks.ntpd import PEERSTATS
 from syncline_design.clocks.series import Array, ClockSeries
 from syncline_design.clocks.sessions import ClockSession, is_leap, went_back
 from syncline_design.clocks.times import moment, shown
-from syncline_design.model.figure_text import format_duration, to_digits
+from syncline_design.model.figure_text import format_duration, percent, to_digits
 
 TAI_MINUS_UTC_S: Final = 37.0  # since 2017
 WHOLE_STEP_S: Final = 0.5
+OF_NO_UTC: Final = 10  # stratum from which on a server, by custom, has no reference of its own
+SELDOM: Final = 0.01  # of rows: less is no more than an outage
 _LARGEST_S, _SMALLEST_S = 0.5, 1e-11
 _THOUSANDS: Final = (1e3, 1e6, 1e9)
 _BLOCK, _FEWEST_BLOCKS = 10, 3  # samples of a block, blocks of either unit
@@ -28,6 +32,7 @@ def doubts(series: Sequence[ClockSeries], sessions: Sequence[ClockSession]) -> t
     found = [
         *(said for one in series for said in (*_stamps(one), *_summer_time(one))),
         *(said for one in sessions for said in _steps(one)),
+        *_no_utc(series),
         *_levels(sessions),
         *_units(sessions),
         *_unit_slip(sessions),
@@ -73,6 +78,20 @@ def _steps(session: ClockSession) -> Iterator[str]:
         yield (f"{series.kind.name}: the offset jumps by {shown(jump)} at "
                f"{moment(at, series.kind.stamps)}: {why} The logs before and after "
                "do not tell of one clock")  # fmt: skip
+
+
+def _no_utc(series: Sequence[ClockSeries]) -> Iterator[str]:
+    """Clocks that follow what says that it follows nothing, or themselves."""
+    for one in series:
+        deep = one.stratum[np.isfinite(one.offset_s)] >= OF_NO_UTC
+        itself = [r for r in (*one.references, one.kind.reference) if r.startswith(ITSELF)]
+        if itself and one.kind.name == f"{PEERSTATS} {itself[0]}":
+            yield f"{one.kind.name}: ntpd's own clock, against which it is never off"
+        elif deep.shape[0] and float(np.mean(deep)) > SELDOM:
+            yield (f"{one.kind.name}: a stratum of {OF_NO_UTC} or more in "
+                   f"{percent(float(np.mean(deep)), 2)} of its rows: what it follows "
+                   "says that it follows no UTC (chronyd's `local stratum`, ntpd's own clock)"
+                   )  # fmt: skip
 
 
 def _levels(sessions: Sequence[ClockSession]) -> Iterator[str]:

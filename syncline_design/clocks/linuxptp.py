@@ -8,10 +8,10 @@ Stamps are seconds since boot, or whole Unix seconds; the date that syslog puts 
 from __future__ import annotations
 
 import re
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Final
 
-from syncline_design.clocks.series import Row, SourceKind, Steering, TimeBase
+from syncline_design.clocks.series import Row, SourceKind, TimeBase
 from syncline_design.machine.quick_dataclass import dataclass
 
 _PROGRAM: Final = re.compile(r"(ptp4l|phc2sys|ts2phc)(?=\[|: )")
@@ -30,6 +30,7 @@ _SUMMARY: Final = re.compile(
 )
 _LOST: Final = re.compile(r"port \d{1,5}[^:]{0,64}: SLAVE to (?!SLAVE)|link down")
 _STARTED: Final = re.compile(r"INITIALIZING to LISTENING on INIT_COMPLETE|selected /dev/ptp\d+ as")
+_CARD: Final = "selected /dev/ptp"
 _UNIX: Final = 1e9
 SYSTEM: Final = "phc2sys CLOCK_REALTIME"
 FOLLOWS_SYSTEM: Final = " by the system clock"  # the name's end of a card in a `sys offset` line
@@ -37,11 +38,6 @@ RESOLUTION_S: Final = 0.5e-9  # of whole nanoseconds
 _MOST: Final = 512  # characters behind a program's name
 _NAMES: Final = 4  # of programs in one line: syslog's and the program's own, twice
 _RANKS: Final = {"phc2sys": 1, "ptp4l": 2, "ts2phc": 3}
-_STEERING: Final[dict[str, Steering]] = {
-    "phc2sys": "servo",
-    "ptp4l": "servo",
-    "ts2phc": "independent",  # against a pulse: no path whose asymmetry could hide
-}
 
 
 @dataclass(slots=True)
@@ -51,6 +47,7 @@ class PtpReader:
     began: set[tuple[str, str]] = field(default_factory=set)
     last: dict[tuple[str, str], SourceKind] = field(default_factory=dict)
     processes: dict[str, str] = field(default_factory=dict)
+    on_card: bool | None = None  # None: no line says what ptp4l steers
 
     def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
         """A line of any of the three programs that holds an offset, or says that lock was lost."""
@@ -86,8 +83,12 @@ class PtpReader:
     def _state(
         self, key: tuple[str, str], time_s: float, body: str
     ) -> tuple[SourceKind, Row, str] | None:
-        if _STARTED.search(body):
+        started = _STARTED.search(body)
+        if started:
             self.began.add(key)
+            # a start that opens no card steers the system clock (software time stamps)
+            if key[0] == "ptp4l":
+                self.on_card = started[0].startswith(_CARD) or bool(self.on_card)
         kind = self.last.get(key)
         if kind is not None and _LOST.search(body):
             return kind, Row(time_s, float("nan"), locked=False), ""
@@ -119,6 +120,8 @@ class PtpReader:
         if key[0] == "phc2sys" and (what or "phc").strip() == "phc":
             what = "CLOCK_REALTIME"  # older versions name only the side that they compare with
         kind = _kind(key, what, time_s, by_system="sys" in (what, against))
+        if key[0] == "ptp4l":
+            kind = replace(kind, of_host=self.on_card is False)
         self.last[key] = kind
         restart = key in self.began
         self.began.discard(key)
@@ -136,5 +139,7 @@ def _kind(key: tuple[str, str], what: str | None, time_s: float, *, by_system: b
     name = f"{program} {named}".strip()
     if program == "phc2sys" and by_system:
         name += FOLLOWS_SYSTEM
-    whole = program != "phc2sys"
-    return SourceKind(name, "linuxptp", _RANKS[program], _STEERING[program], stamps, "", whole)
+    # phc2sys: the card's own error; ts2phc: the delay and the edge of the pulse that it steers by
+    whole = program == "ptp4l"
+    of_host = name == SYSTEM
+    return SourceKind(name, "linuxptp", _RANKS[program], "servo", stamps, "", whole, of_host)

@@ -186,7 +186,7 @@ def _free_running(one: ClockSeries) -> tuple[ClockSeries, str]:
     """A servo that never steered: it only compares, so its offsets are no servo's own."""
     if one.kind.family != "linuxptp" or not len(one) or bool(np.any(one.locked)):
         return one, ""
-    kind = replace(one.kind, steering="independent")
+    kind = replace(one.kind, steering="independent", whole_way=True)
     locked = np.isfinite(one.offset_s)
     return replace(one, kind=kind, locked=locked), (
         f"{one.kind.name} never steered (state s0 throughout): taken as a comparison only"

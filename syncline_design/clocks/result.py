@@ -84,7 +84,8 @@ class TimingClaim(Record):
 class SourceResult(Record):
     """One source that the logs hold; used: the figures rest on it.
 
-    whole_way: whether its hard bound holds the whole way to the reference.
+    whole_way: whether its hard bound holds the whole way to the reference.  of_host: whether it
+    tells of the host's clock, and not of a card's.
     """
 
     name: str
@@ -96,6 +97,7 @@ class SourceResult(Record):
     hard_s: float | None
     used: bool
     whole_way: bool = True
+    of_host: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.clocks.chrony import TRACKING, is_refclock
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.linuxptp import FOLLOWS_SYSTEM, SYSTEM
 from syncline_design.clocks.ntpd import LOOPSTATS
@@ -189,10 +190,30 @@ def _apart_s(asked_s: Array, known_s: Array, after: NDArray[np.int64]) -> Array:
 
 
 def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> SourceSelection:
-    used = tuple(one for one in series if one.kind.name == name)
+    used = tuple(_by_own_reference(one) for one in series if one.kind.name == name)
+    notes = (*notes, *_follows(used))
     others = tuple(one for one in series if one.kind.name != name)
     loops = [one for one in used if one.kind == LOOPSTATS]
     return SourceSelection(used, others, notes, tuple(unlike_their_peers(loops, others)))
+
+
+def _by_own_reference(one: ClockSeries) -> ClockSeries:
+    """A tracking log of a clock that follows a pulse: no path bounds the pulse's cable or edge."""
+    if one.kind != TRACKING or not any(map(is_refclock, one.references)):
+        return one
+    return replace(one, kind=replace(one.kind, whole_way=False))
+
+
+def _follows(used: Sequence[ClockSeries]) -> Iterator[str]:
+    own = sorted({r for one in used if one.kind.name == TRACKING.name for r in one.references
+                  if is_refclock(r)})  # fmt: skip
+    if own:
+        yield (f"the clock follows its own reference ({', '.join(own)}): an error of that one (its "
+               "cable, edge or receiver) shows in none of its offsets")  # fmt: skip
+    cards = [one for one in used if one.kind.family == "linuxptp" and not one.kind.of_host]
+    if cards and cards[0].kind.name.startswith(("ptp4l", "ts2phc")):
+        yield (f"{cards[0].kind.name} tells of a card, or does not say of what: how far the "
+               "host's clock is from it is phc2sys' to say")  # fmt: skip
 
 
 def _chained(series: Sequence[ClockSeries]) -> list[ClockSeries]:

@@ -28,7 +28,8 @@ class Row(NamedTuple):
     hard_s: bound of the error by the daemon's own dispersions and delays; not a number: none
     known.  rate: frequency against the reference [s/s].  skew: what that rate is uncertain by.
     restart: the daemon says that it begins anew.  opened: its log was opened anew before this
-    line, which a start does (and no outage).
+    line, which a start does (and no outage).  stratum: the clock's own.  combined: from how many
+    sources its time was made.
     """
 
     time_s: float
@@ -39,6 +40,8 @@ class Row(NamedTuple):
     skew: float = math.nan
     restart: bool = False
     opened: bool = False
+    stratum: float = math.nan
+    combined: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +52,7 @@ class SourceKind:
     these offsets (a servo nulls what it measures).  reference: what it is held against, where it
     has a name that another log of the family uses.  whole_way: whether a bound of its own holds the
     way to the reference too: a card's error is none of phc2sys' business, a pulse's delay none of a
-    reference clock's.
+    reference clock's.  of_host: whether it is the host's clock that it tells of, and no card's.
     """
 
     name: str
@@ -59,6 +62,7 @@ class SourceKind:
     stamps: TimeBase
     reference: str = ""
     whole_way: bool = True
+    of_host: bool = True
 
 
 @dataclass(slots=True)
@@ -100,6 +104,8 @@ class ClockSeries:
     skew: Array
     restart: Flags
     opened: Flags
+    stratum: Array
+    combined: Array
     references: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
@@ -110,7 +116,7 @@ class ClockSeries:
         return ClockSeries(
             self.kind, self.files, self.time_s[chosen], self.offset_s[chosen], self.hard_s[chosen],
             self.locked[chosen], self.rate[chosen], self.skew[chosen], self.restart[chosen],
-            self.opened[chosen], self.references,
+            self.opened[chosen], self.stratum[chosen], self.combined[chosen], self.references,
         )  # fmt: skip
 
 
@@ -120,8 +126,10 @@ def series_of(
     """Rows of several files as columns."""
     table = np.concatenate([sheet.columns for sheet in sheets])
     references = frozenset[str]().union(*(sheet.references for sheet in sheets))
-    time_s, offset_s, hard_s, locked, rate, skew, restart, opened = table.T.copy()
+    time_s, offset_s, hard_s, locked, rate, skew, restart, opened, stratum, combined = (
+        table.T.copy()
+    )
     return ClockSeries(
         kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5,
-        opened > 0.5, references,
+        opened > 0.5, stratum, combined, references,
     )  # fmt: skip

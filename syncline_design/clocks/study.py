@@ -278,7 +278,8 @@ def _sources(chosen: SourceSelection, settings: TimingSettings) -> tuple[SourceR
         found.append(SourceResult(
             name, sign_of(name), parts[0].kind.steering, sum(len(one) for one in parts),
             len(counted), max(quantiles, default=None), max(hard, default=None),
-            name == chosen.used[0].kind.name, parts[0].kind.whole_way,
+            name == chosen.used[0].kind.name, all(one.kind.whole_way for one in parts),
+            all(one.kind.of_host for one in parts),
         ))  # fmt: skip
     return tuple(found)
 

@@ -19,6 +19,13 @@ from syncline_design.verdict.measured import COMMONLY, coverage_of, coverage_wor
 LONGER: Final = 1.001  # than the sessions: a horizon that they do not show
 
 
+_ALONE: Final = {
+    "servo": ", but by the servo's own offsets, which hide a constant error of the path",
+    "unknown": ", but these offsets may be what steers the clock, and then do not show it to be "
+    "off; if they are not, --independent says so",
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Resting:
     """What a spec rests its clocks' bounds on: for which share of the time, and for how long."""
@@ -48,7 +55,7 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
         times = f"{to_digits(found.bound_s / one.value, 3)} times" if one.value else "not"
         said = f"measured bound {measured}, {times} the {asked} assumed"
         return Judgement("broken", said, figure)
-    why = _why_not(one.value, found, resting)
+    why = _why_not(one.value, found, resting) or _of_what(one, found)
     if not why and one.holdover_s is not None:
         why = no_free_run(one.holdover_s, found)
     status: AssumptionStatus = "not_shown" if why else "holds"
@@ -101,13 +108,21 @@ def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:
     if claim.session_s is not None and resting.horizon_s > LONGER * claim.session_s:
         lasts, asked = format_duration(claim.session_s), format_duration(resting.horizon_s)
         return f", but in sessions of {lasts}, where the spec's horizon is {asked}"
-    if claim.rests_on == "servo" and found.hard_bound_s is None:
-        return ", but by the servo's own offsets, which hide a constant error of the path"
+    if claim.rests_on in _ALONE and found.hard_bound_s is None:
+        return _ALONE[claim.rests_on]
     if not found.source.whole_way:
         return (f", but by {found.source.name} alone: nothing in these logs bounds the rest of the "
                 "way to the reference (a card's own error, the delay of a pulse that steers)"
                 )  # fmt: skip
     return ""
+
+
+def _of_what(one: Assumed, found: Timing) -> str:
+    """Why what bounds a card does not bear out the host's clock; "" where it is that one."""
+    if one.name != "clock" or found.source.of_host:
+        return ""
+    return (f", but {found.source.name} tells of a card's clock, or does not say of which: nothing "
+            "in these logs says how far the host's is from it (phc2sys does)")  # fmt: skip
 
 
 def _rests_on(found: Timing) -> str:
