@@ -148,6 +148,15 @@ def test_a_clock_has_drift_and_holdover_or_neither() -> None:
     assert clock.drift * clock.holdover == pytest.approx(0.288, rel=1e-15)
     assert "holdover" in complaints(ClockEntry, f"{offset}, drift: 20 ppm")[0]
     assert "drift" in complaints(ClockEntry, f"{offset}, holdover: 4 h")[0]
+    both = complaints(ClockEntry, f"{offset}, drift: 20 ppm, holdover: 4 h, offset_after: 1 h")
+    assert "offset_after" in both[0]
+
+
+def test_a_clock_says_for_how_long_without_a_reference_its_figures_are() -> None:
+    offset = "offset: {distribution: constant, value: 0 s}"
+    assert entry(ClockEntry, offset).alone_s is None
+    assert entry(ClockEntry, f"{offset}, drift: 20 ppm, holdover: 4 h").alone_s == 14400.0
+    assert entry(ClockEntry, f"{offset}, offset_after: 24 h").alone_s == 86400.0
 
 
 def test_basis_marks_all_or_single_figures() -> None:

@@ -11,6 +11,7 @@ import pytest
 from plain_enumeration import CATALOGS, bound_of, clock_bound, number, read_catalog
 from syncline_design.model.timing import Normal, TimingError, Uniform, bound
 from syncline_design.spec.catalog import CatalogFile
+from syncline_design.spec.load import load_builtin
 from syncline_design.spec.yaml_text import read
 
 FILES = ("platforms", "sensors", "timestamping")
@@ -224,6 +225,17 @@ def test_clocks_cover_vessel_and_dive() -> None:
     for name, drift_s in (("free_running", 0.288), ("tcxo", 0.0216), ("ocxo", 72e-6)):
         clock = CATALOG["clocks"][name]
         assert number(clock["drift"]) * number(clock["holdover"]) == pytest.approx(drift_s)
+
+
+def test_clocks_that_are_named_for_a_time_without_gnss_say_so_in_figures() -> None:
+    words = {"one day": 86400.0, "four hours": 14400.0, "three days": 259200.0, "a week": 604800.0}
+    seen = 0
+    for clock in load_builtin().clocks.values():
+        told = [s for w, s in words.items() if clock.name.endswith(f" {w} without GNSS")]
+        if told:
+            seen += 1
+            assert clock.alone_s == told[0], clock.name
+    assert seen == 19
 
 
 def test_money_converted_from_dollars_is_right() -> None:

@@ -87,7 +87,7 @@ def _of_vehicle(
     name, key = stage.choice.name, ("stages", stage.index)
     if clock is not None:
         entry = case.clock(vehicle, clock.id)
-        free_s = None if entry is None or entry.holdover is None else float(entry.holdover)
+        free_s = None if entry is None else entry.alone_s
         place = (*key, "clock")
         yield Assumed(name, "clock", "clock", clock.offset_bound_s, place, holdover_s=free_s)
     elif vehicle in told:

@@ -101,6 +101,7 @@ KEYS: dict[str, str] = {
     "note": "Remark for people.",
     "objective": "What the choice makes smallest: cost, mass, power or error.",
     "offset": "Error of the host clock against UTC.",
+    "offset_after": "How long without a reference its offset is stated after: the drift is in it.",
     "omega_max": "Largest angular rate of the vehicle.",
     "origin": "Zero of the local frame, WGS 84: [latitude, longitude, height above the ellipsoid].",
     "over": "Length that a share of a length refers to: a baseline, a slant range.",

@@ -302,11 +302,16 @@ class InfrastructureEntry(Product):
 
 
 class ClockEntry(Product):
-    """How a vehicle's host clock is disciplined; offset is host against UTC."""
+    """How a vehicle's host clock is disciplined; offset is host against UTC.
+
+    offset_after: of an offset that is stated after so long without a reference, and holds what the
+    clock drifts till then; beside drift and holdover, which are added to it, it would count twice.
+    """
 
     offset: ErrorEntry
     drift: Ratio | None = None  # free-running clock: ppm, times holdover
     holdover: PositiveTime | None = None
+    offset_after: PositiveTime | None = None
     requires: dict[str, Count] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -316,7 +321,16 @@ class ClockEntry(Product):
             raise refusals(
                 [((due,), refusal(f"missing beside {given}", "drift and holdover, or neither"))]
             )
+        if self.holdover is not None and self.offset_after is not None:
+            raise refusals([(("offset_after",), refusal(
+                "beside drift and holdover", "one of both", hint="delete one"))])  # fmt: skip
         return self
+
+    @property
+    def alone_s(self) -> float | None:
+        """For how long without a reference its figures are [s]; None of a clock in lock."""
+        length = self.offset_after if self.holdover is None else self.holdover
+        return None if length is None else float(length)
 
 
 class Catalog(FileRecord):

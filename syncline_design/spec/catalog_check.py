@@ -53,10 +53,10 @@ Code = Literal[
     "published",
     "measured",
 ]
-# Words about an entry, or what its type says anyway: they need no source.
+# Words about an entry, what its type says anyway, and what a figure is of: they need no source.
 _PLAIN: Final = frozenset(
     {"name", "source", "basis", "note", "figures", "unusual", "modality", "type", "medium"}
-    | {"needs", "corrects", "lifecycle", "timeline", "requires", "lead_time"}
+    | {"needs", "corrects", "lifecycle", "timeline", "requires", "lead_time", "offset_after"}
 )  # fmt: skip
 _COMPARED: Final = (*SIGMA_DIMENSIONS, "reach", "rate", "cost", "mass", "power")
 
