@@ -71,15 +71,21 @@ def test_swings_of_any_length_keep_to_what_the_vehicle_can(one: Vehicle, most_s:
         assert speed.min() >= one.slowest_mps - 1e-6
         assert np.abs(turn).max() <= 0.76 * one.omega_max_radps
         assert np.hypot(along, speed * turn).max() <= 1.02 * one.acceleration_mps2
-        turning = np.abs(turn) > 1e-3 * np.abs(turn).max() if leg.words.startswith("On") else []
-        if np.any(turning):
-            assert (speed[turning] / np.abs(turn[turning])).min() >= 0.98 * one.turn_radius_m
+        if leg.words.startswith("On"):
+            assert _radii(path).min() >= 0.98 * one.turn_radius_m
 
 
 def _level(path: PathStates) -> tuple[Array, Array]:
     """Speed over ground and turn rate of a path."""
     speed = np.hypot(path.velocity_mps[:, 0], path.velocity_mps[:, 1])
     return speed, np.gradient(path.euler_rad[:, 2], path.time_s)
+
+
+def _radii(path: PathStates) -> Array:
+    """Of every step by which the heading turns: the way of it over its turn."""
+    way = np.linalg.norm(np.diff(path.position_m[:, :2], axis=0), axis=1)
+    turned = np.abs(np.diff(path.euler_rad[:, 2]))
+    return np.asarray(way[turned > 1e-3 * turned.max()] / turned[turned > 1e-3 * turned.max()])
 
 
 def test_the_words_of_a_swing_are_its_path() -> None:

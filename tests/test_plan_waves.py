@@ -110,6 +110,6 @@ def test_what_is_reached_is_not_unseen_and_what_stays_plausible_is(tmp_path: Pat
     assert found.reached
     assert not [one for one in found.unseen if one.startswith(("latency(pos", "lever_arm(pos"))]
     assert "lever_arm(ranging): z_m" in found.unseen or "lever_arm(ranging)" in found.unseen
-    short = planned(load(path), replace(request, minutes=0.1)).result
+    short = planned(load(path), replace(request, minutes=0.05)).result
     assert not short.reached
     assert [one for one in short.unseen if one.startswith(("latency(pos", "lever_arm(pos"))]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field
 
 import numpy as np
@@ -191,10 +191,11 @@ def slopes(view: Scene, acting: Sequence[Acting]) -> Array:
     Columns in the order of the effects and their `slopes()`; the sign is that of the error of an
     uncorrected log, so minus the slope of `Scene.error`.
     """
-    return view.slopes.of(asked(acting), lambda: _slopes(view, acting))
+    return view.slopes.of(asked(acting), lambda: slopes_of(view.error, acting))
 
 
-def _slopes(view: Scene, acting: Sequence[Acting]) -> Array:
+def slopes_of(error: Callable[[Sequence[Acting]], Array], acting: Sequence[Acting]) -> Array:
+    """Minus the slope (n, 3, P) of what effects leave, an error of theirs (n, 3)."""
     columns = []
     for i, one in enumerate(acting):
         for p in one.effect.slopes():
@@ -204,15 +205,13 @@ def _slopes(view: Scene, acting: Sequence[Acting]) -> Array:
             def moved(to: float, i: int = i, one: Acting = one, name: str = p.name) -> Array:
                 values = {**one.values, name: to}
                 changed = Acting(one.effect, one.sensor, one.stage, values)
-                return view.error([*acting[:i], changed, *acting[i + 1 :]])
+                return error([*acting[:i], changed, *acting[i + 1 :]])
 
             # no memory reaches below zero: its slope there is that of both sides together
             both = p.name == one.effect.memory and value < step
-            before = moved(value - step) if both else view.error(acting)
+            before = moved(value - step) if both else error(acting)
             columns.append((before - moved(value + step)) / (2.0 * step if both else step))
-    if not columns:
-        return np.zeros((len(view), 3, 0))
-    return np.stack(columns, axis=-1)
+    return np.stack(columns, axis=-1) if columns else np.zeros((*error(acting).shape, 0))
 
 
 def directed_parts(view: Scene, found: Sequence[Candidate]) -> tuple[Directed, ...]:

@@ -57,6 +57,12 @@ class Scene:
         error = _corrected_error(self, self._departures(acting))
         return without_unlogged_past(self.system, self.rows, error, (*self.known, *acting))
 
+    def mistaken(self, made: Acting, taken: Acting) -> Array:
+        """Error (n, 3) [m] of a log that one effect made, corrected for another one, where this log
+        has neither."""
+        left, own = (_corrected_error(self, self._departures((one,))) for one in (taken, made))
+        return without_unlogged_past(self.system, self.rows, left - own, (*self.known, taken))
+
     def _departures(self, acting: Sequence[Acting]) -> list[Departures]:
         ranged = self.log.kind != "position"
         total = [_mean_timing(self.system, stage, ranged) for stage in self.system.stages]

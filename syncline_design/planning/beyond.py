@@ -4,6 +4,7 @@ To first order a filter lag is a latency, whatever is driven; at 100 ms the two 
 turn.  With the first effect at the size d that was found, e(d) its exact error, and r(t) that of
 the second, the columns
     q = e(d) - r(t0),   S = dr/dt at t0
+(less what the time before the log may have left in a memory, which a fit of the second takes out)
 tell by how much the first beats the second refitted: q' C^-1 q less what S explains of it.  t0 is
 the value at which the second comes nearest to the first on the legs together (Gauss-Newton); on
 any drive it is refitted about there to first order.
@@ -16,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.diagnosis.candidates import slopes, zero_values
+from syncline_design.diagnosis.candidates import slopes_of, zero_values
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
@@ -41,8 +42,12 @@ class BeyondFirst:
 
     def columns(self, view: Scene) -> Array:
         """q and S [m], (n, 3, width); zero where nothing is known."""
-        apart = view.error((self.second,)) - view.error((self.first,))
-        both = np.concatenate([apart[:, :, None], slopes(view, [self.second])], axis=2)
+
+        def apart(taken: Sequence[Acting]) -> Array:
+            return view.mistaken(self.first, taken[0])
+
+        own = (self.second,)
+        both = np.concatenate([apart(own)[:, :, None], slopes_of(apart, own)], axis=2)
         found: Array = np.nan_to_num(both)
         return found
 

@@ -1,68 +1,81 @@
-"""A drive of one leg cut to what is asked: of each shape of swing the shortest that is enough.
+"""A drive of one leg cut to what is asked: of every shape of swing the shortest that is enough.
 
-A library holds legs of a few lengths; what is asked needs just so much.  Each shape is tried
-shorter than the best drive so far, judged whole; where that is enough, the least time of it that
-still is enough is found by halving.
+A library holds legs of a few lengths; what is asked needs just so much.  A longer swing is faster,
+and wider about, so that what is enough at one length need not be at a longer one: lengths are tried
+over a ladder, and over others down from the best drive so far until none of them is enough; then in
+finer steps where that is nearly as short as the shortest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final
-
-import numpy as np
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.drives import World
-from syncline_design.planning.legs import transition
-from syncline_design.planning.placing import LegTold, lasting_s
+from syncline_design.planning.legs import Leg, transition
 from syncline_design.planning.swings import SHAPES, SwingShape, swing_within
 
 SAVES: Final = 0.95  # of a drive's time: one that takes more saves nothing that matters
-TRIED: Final = (SAVES, 0.75)  # of it: a longer swing is faster, and wider about
-HALVINGS: Final = 4
 LONGEST_S: Final = 240.0  # of a drive that one swing may do for
-NOTHING: Final = np.zeros((4, 1, 1))  # told so far: it is judged whole
-Judged = Callable[[LegTold], bool]
+LADDER: Final = (1.0, 0.85, 0.72, 0.61, 0.52)  # of a time
+MOST_LADDERS: Final = 6
+FINER: Final = ((1.5, (0.95, 0.9, 0.85, 0.8)), (1.15, (0.98, 0.96, 0.94)))
+"""Of the shortest: how long a shape may take to be tried at finer steps, and these."""
+Sifted = Callable[[Sequence[Leg]], Sequence[Leg]]
+OfStage = tuple[int, SwingShape]
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """A drive of one swing that is enough; lasts_s: with the run up to it."""
+
+    of: OfStage
+    leg: Leg
+    lasts_s: float
 
 
 @dataclass(frozen=True, eq=False)
 class Cutting:
-    """Swings cut to what is asked; enough: whether one is, judged whole."""
+    """Swings cut to what is asked; enough: those drives of one leg that are, judged whole."""
 
     world: World
     stages: tuple[int, ...]
-    enough: Judged
+    enough: Sifted
 
-    def shorter(self, than_s: float) -> LegTold | None:
-        """The shortest swing that is enough and saves time that matters."""
-        found, best_s = None, min(than_s, LONGEST_S)
-        for stage, shape in self._every():
-            tries = (self._enough(stage, shape, share * best_s) for share in TRIED)
-            one = next((told for told in tries if told is not None), None)
-            if one is not None:
-                found = self._cut(stage, shape, one)
-                best_s = lasting_s([found])
+    def shorter(self, than_s: float) -> list[Leg]:
+        """Swings that are enough and save time that matters, the shortest first."""
+        most_s = SAVES * min(than_s, LONGEST_S / SAVES)
+        every = [(stage, shape) for stage in self.stages for shape in SHAPES]
+        found = self._down(every, most_s)
+        for near, shares in FINER:
+            if not found:
+                break
+            best_s = min(cut.lasts_s for cut in found)
+            close = dict.fromkeys(cut.of for cut in found if cut.lasts_s <= near * best_s)
+            found += self._tried(close, [share * best_s for share in shares])
+        return [cut.leg for cut in sorted(found, key=lambda cut: cut.lasts_s)]
+
+    def _down(self, shapes: Sequence[OfStage], most_s: float) -> list[Cut]:
+        """What is enough on a ladder of times, and on others down from the shortest that is."""
+        found: list[Cut] = []
+        for _ in range(MOST_LADDERS):
+            below = self._tried(shapes, [share * most_s for share in LADDER])
+            if not below:
+                break
+            found += below
+            most_s = SAVES * min(cut.lasts_s for cut in below)
         return found
 
-    def _every(self) -> Iterator[tuple[int, SwingShape]]:
-        return ((stage, shape) for stage in self.stages for shape in SHAPES)
+    def _tried(self, shapes: Iterable[OfStage], times_s: Sequence[float]) -> list[Cut]:
+        """Of each shape and time the longest swing within it, where it is enough."""
+        every = [cut for of in shapes for s in times_s if (cut := self._within(of, s)) is not None]
+        enough = set(map(id, self.enough([cut.leg for cut in every])))
+        return [cut for cut in every if id(cut.leg) in enough]
 
-    def _cut(self, stage: int, shape: SwingShape, known: LegTold) -> LegTold:
-        """The shortest of a shape that is enough; known: one that is."""
-        short_s = 0.0
-        for _ in range(HALVINGS):
-            middle_s = 0.5 * (short_s + lasting_s([known]))
-            one = self._enough(stage, shape, middle_s)
-            known, short_s = (known, middle_s) if one is None else (one, short_s)
-        return known
-
-    def _enough(self, stage: int, shape: SwingShape, most_s: float) -> LegTold | None:
-        """The longest of a shape within a time, the run up to it counted, where it is enough."""
+    def _within(self, of: OfStage, most_s: float) -> Cut | None:
+        stage, shape = of
         vehicle = self.world.vehicles[stage]
-        begun_s = transition(vehicle, 0.0).duration_s
+        begun_s = transition(vehicle, 0.0).duration_s  # the same at whatever speed
         leg = swing_within(vehicle, stage, shape, most_s - begun_s)
-        if leg is None:
-            return None
-        told = self.world.placeable(leg, NOTHING, NOTHING, NOTHING)
-        return told if self.enough(told) else None
+        return None if leg is None else Cut(of, leg, begun_s + leg.duration_s)

@@ -16,6 +16,7 @@ from syncline_design.diagnosis.result import Noise
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.effects.acting import acting_of
 from syncline_design.effects.record import Array
+from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
@@ -161,6 +162,21 @@ class World:
             in_force().check()
             courses = self.courses_of(leg.stage, leg.course)
             flown += [planned_log(self.system, one) for one in self.turned_about(courses)]
+        parts = self._apart(flown)
+        return tuple(self._summed(leg, parts[4 * k : 4 * k + 4]) for k, leg in enumerate(legs))
+
+    def alone(self, legs: Sequence[Leg]) -> tuple[Array, ...]:
+        """Information from drives of one leg each, the run up to it with it; as one log, too."""
+        flown = []
+        for leg in legs:
+            in_force().check()
+            begun = transition(self.vehicles[leg.stage], 0.0, leg.begins_mps)
+            courses = self.courses_of(leg.stage, joined([begun, leg.course]))
+            flown.append(planned_log(self.system, self.driven(courses)))
+        return tuple(now for now, _, _ in self._apart(flown))
+
+    def _apart(self, flown: Sequence[Log]) -> list[tuple[Array, Array, Array]]:
+        """G00, G0d + Gd0 and Gdd of each of some logs, looked at as the runs of one."""
         whole, ends = one_after_another(flown, GAP_S)
         view = scene(self.system, whole, acting_of(self.system))
         after = np.concatenate([late(whole.time_s[a:b]) for a, b in pairwise(ends) if b > a])
@@ -170,8 +186,7 @@ class World:
         drifting = np.flatnonzero(np.any(drifts != 0.0, axis=(0, 1)))
         both = np.concatenate([slopes, drifts[:, :, drifting]], axis=2)
         count = slopes.shape[2]
-        parts = [self._told(noise, both, slice(*pair), drifting, count) for pair in pairwise(ends)]
-        return tuple(self._summed(leg, parts[4 * k : 4 * k + 4]) for k, leg in enumerate(legs))
+        return [self._told(noise, both, slice(*pair), drifting, count) for pair in pairwise(ends)]
 
     def _told(
         self,
@@ -193,13 +208,17 @@ class World:
 
     def _summed(self, leg: Leg, parts: Sequence[tuple[Array, Array, Array]]) -> LegTold:
         now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
-        return self.placeable(leg, now, once, twice)
+        return self._placeable(leg, now, once, twice)
 
-    def placeable(self, leg: Leg, now: Array, once: Array, twice: Array) -> LegTold:
+    def untold(self, leg: Leg) -> LegTold:
+        """A leg with how it is placed alone, to ask whether it fits."""
+        return self._placeable(leg, *(np.zeros((4, 1, 1)) for _ in range(3)))
+
+    def _placeable(self, leg: Leg, now: Array, once: Array, twice: Array) -> LegTold:
         """A leg with what it tells and how it is placed."""
         vehicle = self.vehicles[leg.stage]
         path = travelled(vehicle, leg.course)
-        turns_s = (transition(vehicle, 0.0).duration_s, transition(vehicle, math.pi).duration_s)
+        turns_s = _turns_s(vehicle, leg.begins_mps)
         return LegTold(
             leg,
             now,
@@ -225,6 +244,14 @@ class World:
             )
             for one in self.vehicles
         )
+
+
+def _turns_s(vehicle: Vehicle, begins_mps: float | None) -> tuple[float, float]:
+    """Time straight on to a leg, and of a turn about to it; who begins at rest does not turn."""
+    straight = transition(vehicle, 0.0, begins_mps).duration_s
+    if begins_mps == 0.0 and not vehicle.hovers:
+        return straight, math.inf
+    return straight, transition(vehicle, math.pi, begins_mps).duration_s
 
 
 def _swept(path: PathStates) -> Swept:
@@ -277,7 +304,7 @@ def whole_drive(
     for placed in arranged(sequence):
         leg = placed.told.leg
         begun = steps
-        turn = transition(world.vehicles[leg.stage], placed.turn_rad)
+        turn = transition(world.vehicles[leg.stage], placed.turn_rad, leg.begins_mps)
         for course in (turn, leg.course):
             for own, one in zip(parts, world.courses_of(leg.stage, course), strict=True):
                 own.append(one)

@@ -20,6 +20,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.cutting import SAVES, Cutting
 from syncline_design.planning.drives import whole_information
 from syncline_design.planning.effort import Effort
+from syncline_design.planning.legs import Leg
 from syncline_design.planning.placing import LegTold, lasting_s
 from syncline_design.planning.search import LegSearch, reaching
 from syncline_design.planning.setup import Setup
@@ -28,7 +29,8 @@ AIM: Final = 0.993  # of what is asked that a drive is to reach
 CLOSE: Final = 0.985  # of what is asked: from there on a drive tells hardly more
 TRIED: Final = 5  # margins
 MOST_JUDGED: Final = 24  # drives that are judged whole
-FEW_ROWS: Final = 300  # of a leg that is only tried
+FEW_ROWS: Final = 200  # of the longest leg that is only tried
+MOST_CUT: Final = 6  # legs cut to what is asked that are judged by all their rows
 ALIKE: Final = 0.003  # by which two margins differ that are as good as one
 BY_TURNS: Final = 0.6  # of what one leg falls short by alone that the turns beside it may make up
 MOST_PASSED_BY: Final = 24  # drives passed by that are judged whole
@@ -69,18 +71,21 @@ def shortest(setup: Setup, search: LegSearch, most_s: float) -> Shortest:
 def _cut(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTold]:
     """The drive, or a shorter one of one swing of speed that is cut to what is asked."""
 
-    def is_enough(told: LegTold) -> bool:
-        if search.deadline.is_over or search.effort.is_half_over or not search.fits([told]):
-            return False
-        return whole.roughly(told) <= AIM
+    world, stages = whole.setup.world, tuple(sorted({told.leg.stage for told in search.legs}))
 
-    stages = tuple(sorted({told.leg.stage for told in search.legs}))
-    cutting = Cutting(whole.setup.world, stages, is_enough)
-    found = cutting.shorter(lasting_s(enough))
-    if found is None:
-        return enough
-    cut = list(whole.setup.world.looked_at([found.leg]))
-    return cut if whole.worst(cut) <= 1.0 else enough
+    def enough_of(legs: Sequence[Leg]) -> list[Leg]:
+        if search.deadline.is_over or search.effort.is_half_over:
+            return []
+        fitting = [leg for leg in legs if search.fits([world.untold(leg)])]
+        return [
+            leg for leg, worst in zip(fitting, whole.roughly(fitting), strict=True) if worst <= AIM
+        ]
+
+    shorter = Cutting(world, stages, enough_of).shorter(lasting_s(enough))
+    for cut in (list(world.looked_at([leg])) for leg in shorter[:MOST_CUT]):
+        if whole.worst(cut) <= 1.0:
+            return cut
+    return enough
 
 
 def _passed_by(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTold]:
@@ -143,12 +148,14 @@ class _Whole:
             self.known[key] = worst, legs  # whose places in memory no others may take
         return self.known[key][0]
 
-    def roughly(self, told: LegTold) -> float:
-        """The same of one leg from a few of its rows, each of which counts for several."""
+    def roughly(self, legs: Sequence[Leg]) -> list[float]:
+        """The same of drives of one leg each, from a few rows, each of which counts for several."""
+        if not legs:
+            return []
         in_force().check()
-        world = self.setup.world.coarse(lasting_s([told]), FEW_ROWS)
-        self.effort.look_at(world.computed_hz * lasting_s([told]))
-        return self.setup.judge.worst(whole_information(world, [told]))
+        world = self.setup.world.coarse(max(leg.duration_s for leg in legs), FEW_ROWS)
+        self.effort.look_at(world.computed_hz * sum(leg.duration_s for leg in legs))
+        return [self.setup.judge.worst(told) for told in world.alone(legs)]
 
     def first_enough(self, drives: Sequence[list[LegTold]]) -> list[LegTold] | None:
         """The first that is enough, of as many as may be judged."""

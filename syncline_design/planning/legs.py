@@ -28,12 +28,16 @@ MOST_LEG_S = 300.0
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One leg of one stage's vehicle; words: what to do, for who drives."""
+    """One leg of one stage's vehicle; words: what to do, for who drives.
+
+    begins_mps: where it begins at another speed than the joining one, so that it follows none.
+    """
 
     name: str
     stage: int
     words: str
     course: CourseCommands
+    begins_mps: float | None = None
 
     @property
     def duration_s(self) -> float:
@@ -44,14 +48,20 @@ class LegTooLongError(Exception):
     """A leg that takes longer than any is driven."""
 
 
-def ramps(vehicle: Vehicle, steps: list[tuple[float, float]], join_mps: float) -> Array:
-    """Speed over time: from the joining speed through (speed, hold [s]) and back to it.
+def ramps(
+    vehicle: Vehicle,
+    steps: list[tuple[float, float]],
+    begins_mps: float,
+    ends_mps: float | None = None,
+) -> Array:
+    """Speed over time: from one speed through (speed, hold [s]) and back to it, or to another.
 
     Raises LegTooLongError before anything of that length is made.
     """
     slope = 0.6 * vehicle.acceleration_mps2
-    at, parts, every = join_mps, [], [*steps, (join_mps, 0.0)]
-    speeds = [join_mps, *(speed for speed, _ in every)]
+    at, parts = begins_mps, []
+    every = [*steps, (begins_mps if ends_mps is None else ends_mps, 0.0)]
+    speeds = [begins_mps, *(speed for speed, _ in every)]
     lasts_s = sum(abs(b - a) / slope for a, b in pairwise(speeds)) + sum(s for _, s in every)
     if not lasts_s <= MOST_LEG_S:
         raise LegTooLongError
@@ -87,9 +97,11 @@ def _room_s(vehicle: Vehicle) -> float:
     return max(2.0, 4.0 * vehicle.rounding_s)
 
 
-def transition(vehicle: Vehicle, angle_rad: float) -> CourseCommands:
-    """The turn between two legs, at the joining speed."""
-    speed = vehicle.join_mps
+def transition(
+    vehicle: Vehicle, angle_rad: float, speed_mps: float | None = None
+) -> CourseCommands:
+    """The turn between two legs, at the joining speed or the one at which the next begins."""
+    speed = vehicle.join_mps if speed_mps is None else speed_mps
     rate = vehicle.turn_radps(speed) if speed > 0.0 else vehicle.turn_radps(0.0)
     count = max(round(abs(angle_rad) / rate / STEP_S), 1) if angle_rad else 0
     rest = round(2.0 * vehicle.rounding_s / STEP_S)

@@ -81,9 +81,9 @@ class LegTold:
     """What one leg tells at each of the four headings: G00, G0d + Gd0, Gdd, (4, p + 1, p + 1) each,
     the last row and column what the noise shifts.
 
-    swept: of the leg driven northwards; turned_rad: its net turn.  turns_s: time to the next leg
-    straight on, and after a turn about.  room: None where the vehicle may go anywhere; what its
-    turns take is not looked at then.
+    swept: of the leg driven northwards; turned_rad: its net turn.  turns_s: time to the leg
+    straight on, and after a turn about; infinite where it can only be driven straight on.  room:
+    None where the vehicle may go anywhere; what its turns take is not looked at then.
     """
 
     leg: Leg
@@ -114,6 +114,8 @@ class LegTold:
         """At each of the four headings; a turn about goes either way round."""
         for heading in range(4):
             angle = math.remainder(QUARTER_RAD * heading - heading_rad, 2.0 * math.pi)
+            if angle and math.isinf(self.turns_s[1]):
+                continue
             yield self._way(heading, angle)
             if self.room is not None and abs(round(angle / QUARTER_RAD)) == ABOUT:
                 yield self._way(heading, angle - math.copysign(2.0 * math.pi, angle))
@@ -129,6 +131,8 @@ class LegTold:
     def _turn_s(self, angle_rad: float) -> float:
         """Time of a turn."""
         straight, about = self.turns_s
+        if not angle_rad:
+            return straight
         share = abs(math.remainder(angle_rad, 2.0 * math.pi)) / math.pi
         return straight + share * (about - straight)
 
