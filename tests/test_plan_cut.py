@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from syncline_design.effects.record import Array
+from syncline_design.planning.drives import World, whole_information
 from syncline_design.planning.leg_library import library
 from syncline_design.planning.path import PathStates, travelled
 from syncline_design.planning.run import plan as planned
-from syncline_design.planning.setup import PlanRequest
-from syncline_design.planning.swings import SHAPES, swing_within
+from syncline_design.planning.setup import PlanRequest, Setup
+from syncline_design.planning.swings import SHAPES, SwingShape, swing_within
 from syncline_design.planning.telling import PlanRun
 from syncline_design.planning.vehicle import Vehicle
 from syncline_design.planning.wanted import PlanWanted, reach_of, separate_of
@@ -123,22 +124,56 @@ RIVALS = "latency(ranging), lever_arm(position), lever_arm(ranging)"
 @pytest.mark.parametrize(
     ("wanted", "seconds"),
     [
-        # driven by hand and judged enough: once down to 0.1 m/s and up again on 90 deg of a
-        # circle of 10 m radius, 18.2 s
-        (PlanWanted((), separate_of("latency(position)=44.3 ms", RIVALS)), 18.2),
-        # 0.6 to 3.6 m/s once, on 60 deg: 15.6 s
-        (PlanWanted(reach_of("latency(position)=2 ms")), 15.6),
+        # the shortest of 1800 drives drawn at random, each judged whole: one to three changes of
+        # speed at 0.48 m/s^2, held or not, on an arc (3.4 to 1.1 m/s on 18 m; 3.5 to 0.75 m/s on
+        # 19 m).  A tenth longer of the second the best shape is at 1.05 of what is asked.
+        (PlanWanted((), separate_of("latency(position)=44.3 ms", RIVALS)), 1.15 * 8.1),
+        (PlanWanted(reach_of("latency(position)=2 ms")), 1.35 * 7.25),
     ],
 )
 def test_no_drive_of_one_swing_is_much_shorter(
     wanted: PlanWanted, seconds: float, tmp_path: Path
 ) -> None:
-    """Within 15 % of drives that somebody else thought of; the least was 1.5 and 2.9 times that
-    long.  With the least as its minutes the very drive is found."""
+    """Near drives that somebody else thought of; the least was twice as long while its legs began
+    at their joining speed.  With the least as its minutes the very drive is found."""
     found = asked(tmp_path, wanted).result
     assert found.reached
-    assert found.duration_s < 1.15 * seconds
+    assert found.duration_s < seconds
     assert found.least_minutes is not None
     again = asked(tmp_path, wanted, minutes=found.least_minutes + 1e-6).result
     assert again.reached
     assert again.duration_s == found.duration_s
+
+
+@pytest.fixture(scope="module")
+def tractor(tmp_path_factory: pytest.TempPathFactory) -> World:
+    path = tmp_path_factory.mktemp("world") / "tractor.yaml"
+    path.write_text(TRACTOR, encoding="utf-8")
+    wanted = PlanWanted(reach_of("latency(position)=2 ms"))
+    return Setup.begun(load(path), PlanRequest(wanted, line_plans=False)).world
+
+
+def test_what_begins_at_rest_is_driven_straight_on_and_alone(tractor: World) -> None:
+    """A car does not turn on the spot, and nothing comes before what begins at rest."""
+    one = VEHICLES["ground"]
+    rise = swing_within(one, 0, SwingShape(1.0, 0.5, "rise"), 15.0)
+    assert rise is not None
+    assert rise.begins_mps == 0.0
+    assert "from rest up to" in rise.words
+    assert rise.words.endswith("back to rest")
+    speed, _ = _level(travelled(one, rise.course))
+    assert speed[0] < 0.02 * speed.max() > speed[-1]
+    told = tractor.untold(rise)
+    assert [way.heading for way in told.ways_from(0.0)] == [0]
+    assert [way.turn_rad for way in told.ways_from(0.0)] == [0.0]
+
+
+def test_many_drives_looked_at_as_one_log_tell_what_each_tells(tractor: World) -> None:
+    """Each judged whole, by the path of its own log."""
+    legs = [swing_within(tractor.vehicles[0], 0, shape, 12.0) for shape in SHAPES]
+    made = [leg for leg in legs if leg is not None]
+    assert len(made) == len(SHAPES)
+    for leg, found in zip(made, tractor.alone(made), strict=True):
+        whole = whole_information(tractor, [tractor.untold(leg)])
+        scale = np.sqrt(np.diag(whole))
+        assert np.abs(found - whole).max() <= 1e-6 * scale.max() ** 2

@@ -28,12 +28,13 @@ SLOWEST_SHARE: Final = 0.02  # of v_max: slower, little is left that a swing cou
 LEAST_SWING: Final = 1.1  # fast over slow
 ALONG: Final = 0.6  # of the acceleration, beside what turns take (`ramps`)
 HALVINGS: Final = 10
+FROM_FASTEST: Final = ("ease", "sag")
 AT_REST: Final = 0.005  # of the fastest: what rounding leaves of a stop
 HELD_S: Final = 0.5  # shorter, a speed is not held but passed
-ALONE: Final = ("rise", "dip", "brake")  # of a drive of one leg: it joins to nothing
+ALONE: Final = ("rise", "dip", "brake", "ease", "sag")  # of a drive of one leg: it joins to nothing
 
 
-Way = Literal["down", "up", "both", "rise", "dip", "brake"]
+Way = Literal["down", "up", "both", "rise", "dip", "brake", "ease", "sag"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,8 @@ class SwingShape:
 
     bend: of the tightest arc that all its speeds allow, 0 a line; a circle at most.  hold: how long
     slow and fast are held each, over the time between them.  way: from the joining speed down only,
-    up only, or both; or of a drive of its own, that joins to nothing: a rise from slow to fast and
-    back, a dip from fast, or braking.
+    up only, or both; or of a drive of its own, that joins to nothing: from the slowest speed a rise
+    and back, a dip down to it, or braking to it; from the fastest speed easing, or a sag and back.
     """
 
     bend: float
@@ -54,6 +55,8 @@ class SwingShape:
 HOLDS: Final[dict[Way, tuple[float, ...]]] = {
     "brake": (0.1, 0.5, 1.5, 4.0),
     "dip": (0.1, 0.5),
+    "ease": (0.1, 0.5, 1.5),
+    "sag": (0.1, 0.5),
     "rise": (0.1, 0.5),
     "down": (0.1, 0.5),
     "up": (4.0,),
@@ -152,6 +155,8 @@ def _run(vehicle: Vehicle, shape: SwingShape, ramp_s: float) -> _SpeedRun:
     least = max(vehicle.slowest_mps, SLOWEST_SHARE * vehicle.v_max_mps)
     if shape.way in ALONE:
         slow, fast = vehicle.slowest_mps, min(vehicle.slowest_mps + change, most)
+        if shape.way in FROM_FASTEST:
+            slow, fast = max(most - change, slow), most
         return _alone(shape.way, (slow, hold_s), (fast, hold_s))
     match shape.way:
         case "up":
@@ -171,7 +176,7 @@ def _alone(way: Way, slow: tuple[float, float], fast: tuple[float, float]) -> _S
     match way:
         case "rise":
             return _SpeedRun(slow[0], (fast,), slow[0])
-        case "dip":
+        case "dip" | "sag":
             return _SpeedRun(fast[0], (slow,), fast[0])
         case _:
             return _SpeedRun(fast[0], (fast, slow), slow[0])

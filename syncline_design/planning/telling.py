@@ -265,8 +265,9 @@ class Telling:
         angle = round(math.degrees(one.turn_rad))
         if angle == 0:
             return one.leg.words
-        vehicle = self.setup.world.vehicles[one.leg.stage]
-        how = f"at {to_digits(vehicle.join_mps, 2)} m/s" if vehicle.join_mps else "on the spot"
+        joins_mps = self.setup.world.vehicles[one.leg.stage].join_mps
+        speed = joins_mps if one.leg.begins_mps is None else one.leg.begins_mps
+        how = f"at {to_digits(speed, 2)} m/s" if speed else "on the spot"
         side = "right" if angle > 0 else "left"
         words = one.leg.words
         return f"Turn {side} by {abs(angle)} deg {how}, then {words[0].lower()}{words[1:]}"

@@ -198,7 +198,9 @@ def _how_far(found: Plan) -> str:
 
 
 def _minutes(minutes: float) -> str:
-    """`2.8 min`, `130 min`, `12 h`."""
+    """`5.3 s`, `2.8 min`, `130 min`, `12 h`."""
+    if minutes < 1.0:
+        return numbers.time(60.0 * minutes, 2)
     if minutes >= 600.0:
         return numbers.typeset(f"{numbers.places(minutes / 60.0, 0)} h")
     return numbers.typeset(
@@ -266,9 +268,10 @@ def _legs(found: Plan, path: PathStates) -> list[Node]:
         for leg in found.legs
     ]  # fmt: skip
     heads = ("Leg", "From, to", "Heading", *(["Stage"] if several else []), "What to do")
-    begun_mps = math.hypot(*path.velocity_mps[0])
+    begun_mps = math.hypot(*path.velocity_mps[0, :2])  # what heaves a ship is no way
     how = f"at {numbers.speed(begun_mps, 2)}" if begun_mps > STANDS_MPS else "at rest"
-    words = f"The drive begins {how}, and so does every leg; its turn counts as its time."
+    every = ", and so does every leg; its turn counts as its time" if len(found.legs) > 1 else ""
+    words = f"The drive begins {how}{every}."
     return [*show(table("Legs", heads, rows), silent=True), Text(words, quiet=True)]
 
 
