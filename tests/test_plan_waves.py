@@ -104,12 +104,12 @@ def test_what_is_reached_is_not_unseen_and_what_stays_plausible_is(tmp_path: Pat
     """By the information itself: each effect with what is asked free beside it."""
     path = tmp_path / "tractor.yaml"
     path.write_text(TRACTOR, encoding="utf-8")
-    wanted = PlanWanted(reach_of("latency(position)=5 ms, lever_arm(position)=2 cm"))
+    wanted = PlanWanted(reach_of("latency(position)=1 ms, lever_arm(position)=5 mm"))
     request = PlanRequest(wanted, line_plans=False)
     found = planned(load(path), request).result
     assert found.reached
     assert not [one for one in found.unseen if one.startswith(("latency(pos", "lever_arm(pos"))]
     assert "lever_arm(ranging): z_m" in found.unseen or "lever_arm(ranging)" in found.unseen
-    short = planned(load(path), replace(request, minutes=0.05)).result
+    short = planned(load(path), replace(request, minutes=0.5)).result
     assert not short.reached
     assert [one for one in short.unseen if one.startswith(("latency(pos", "lever_arm(pos"))]
