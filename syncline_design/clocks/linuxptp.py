@@ -30,6 +30,7 @@ _SUMMARY: Final = re.compile(
 )
 _LOST: Final = re.compile(r"port \d{1,5}[^:]{0,64}: SLAVE to (?!SLAVE)|link down")
 _STARTED: Final = re.compile(r"INITIALIZING to LISTENING on INIT_COMPLETE|selected /dev/ptp\d+ as")
+_MASTER: Final = re.compile(r"selected best master clock ([0-9a-f.:-]{1,40})")
 _CARD: Final = "selected /dev/ptp"
 _UNIX: Final = 1e9
 SYSTEM: Final = "phc2sys CLOCK_REALTIME"
@@ -47,6 +48,7 @@ class PtpReader:
     began: set[tuple[str, str]] = field(default_factory=set)
     last: dict[tuple[str, str], SourceKind] = field(default_factory=dict)
     processes: dict[str, str] = field(default_factory=dict)
+    master: str = ""
     on_card: bool | None = None  # None: no line says what ptp4l steers
 
     def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
@@ -89,6 +91,8 @@ class PtpReader:
             # a start that opens no card steers the system clock (software time stamps)
             if key[0] == "ptp4l":
                 self.on_card = started[0].startswith(_CARD) or bool(self.on_card)
+        if chosen := _MASTER.search(body):
+            self.master = chosen[1]
         kind = self.last.get(key)
         if kind is not None and _LOST.search(body):
             return kind, Row(time_s, float("nan"), locked=False), ""
@@ -126,7 +130,11 @@ class PtpReader:
         restart = key in self.began
         self.began.discard(key)
         rate = 1e-9 * int(freq) if freq else float("nan")
-        return kind, Row(time_s, offset_s, hard, locked, rate, restart=restart), ""
+        return (
+            kind,
+            Row(time_s, offset_s, hard, locked, rate, restart=restart),
+            (self.master if key[0] == "ptp4l" else ""),
+        )
 
 
 def _kind(key: tuple[str, str], what: str | None, time_s: float, *, by_system: bool) -> SourceKind:

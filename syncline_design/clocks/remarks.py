@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from typing import Final
 
@@ -41,9 +40,6 @@ def remarks(
     if short:
         said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
                     "(less than 20 samples in lock, or than 90 s)")  # fmt: skip
-    if _overlap(sessions):
-        said.append("sessions overlap in time: if these are several clocks, the claim is for such "
-                    "clocks together")  # fmt: skip
     brief = sum(
         one.counted
         and one.autocorrelation_s is not None
@@ -86,13 +82,6 @@ def _stands_apart(sessions: Sequence[ClockSession], quantiles: Array) -> str:
     sizes = [format_duration(rounded(float(quantiles[k]), 3)) for k in (order[-1], order[-2])]
     return (f"; the session from {begin} alone makes it so wide ({sizes[0]}, the others "
             f"{sizes[1]} at most): see what happened there")  # fmt: skip
-
-
-def _overlap(sessions: Sequence[ClockSession]) -> bool:
-    """Whether two sessions with dates were at the same time."""
-    spans = sorted((float(s.series.time_s[0]), float(s.series.time_s[-1]))
-                   for s in sessions if s.series.kind.stamps == "utc")  # fmt: skip
-    return any(after[0] < before[1] for before, after in itertools.pairwise(spans))
 
 
 def _outages(sessions: Sequence[ClockSession], gap_s: float) -> Iterator[str]:

@@ -10,7 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.clocks.chrony import TRACKING, is_refclock
+from syncline_design.clocks.chrony import TRACKING, UNSET, is_refclock
+from syncline_design.clocks.disagreement import disagreeing
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.linuxptp import FOLLOWS_SYSTEM, SYSTEM
 from syncline_design.clocks.ntpd import LOOPSTATS
@@ -32,6 +33,7 @@ SIGNS: Final = {
     "ppstest": "clock - whole second in the log",
     "CSV": "local - reference by the column's name",
 }
+MOST_NAMED: Final = 4  # of masters
 COVERED: Final = 0.99  # of a refclock's rows, that a tracking log has to be about
 LONGEST_POLL_S: Final = 2048.0  # twice chrony's default maxpoll of 10
 _LINUXPTP_SIGN: Final = "local - reference in the log"
@@ -41,13 +43,15 @@ _LINUXPTP_SIGN: Final = "local - reference in the log"
 class SourceSelection:
     """Series of the source that is used, all others, and what has to be said of the choice.
 
-    doubts: where what is used and what it was made from disagree.
+    doubts: where what is used and what it was made from disagree.  reservations: where others
+    disagree.
     """
 
     used: tuple[ClockSeries, ...]
     others: tuple[ClockSeries, ...]
     notes: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    reservations: tuple[str, ...] = ()
 
 
 def sign_of(name: str) -> str:
@@ -155,7 +159,12 @@ def _independent_refclocks(series: Sequence[ClockSeries]) -> tuple[list[ClockSer
         )
         if tracked and unnamed:
             covered = _covered(one, tracked)
-            if covered >= COVERED:
+            if covered >= COVERED and (more := _combined(tracked, series)):
+                notes.append(f"{one.kind.name}: the tracking log combines up to {more} sources "
+                             "(Co), more than the servers that these logs name: it may be one of "
+                             "them, and steer (statistics.log names them all)")  # fmt: skip
+                one = replace(one, kind=replace(one.kind, steering="unknown"))
+            elif covered >= COVERED:
                 notes.append(f"{one.kind.name} steers nothing by the tracking log: independent")
                 kind = replace(one.kind, steering="independent", rank=0, whole_way=True)
                 one = replace(one, kind=kind)
@@ -165,6 +174,17 @@ def _independent_refclocks(series: Sequence[ClockSeries]) -> tuple[list[ClockSer
                              "steered the clock else is not in these logs")  # fmt: skip
         found.append(one)
     return found, list(dict.fromkeys(notes))
+
+
+def _combined(tracked: Sequence[ClockSeries], series: Sequence[ClockSeries]) -> int:
+    """How many sources the tracking log combines, where that is more than are named; else 0."""
+    servers = {r for one in tracked for r in one.references if not is_refclock(r)} - {UNSET}
+    servers |= {one.kind.reference for one in series
+                if one.kind.name.startswith(("chrony statistics", "chrony measurements"))
+                and not is_refclock(one.kind.reference)}  # fmt: skip
+    counts = np.concatenate([one.combined[one.locked] for one in tracked])
+    most = int(np.max(counts, initial=0.0))
+    return most if most > max(1, len(servers)) else 0
 
 
 def _covered(one: ClockSeries, tracked: Sequence[ClockSeries]) -> float:
@@ -194,7 +214,10 @@ def _split(series: Sequence[ClockSeries], name: str, notes: tuple[str, ...]) -> 
     notes = (*notes, *_follows(used))
     others = tuple(one for one in series if one.kind.name != name)
     loops = [one for one in used if one.kind == LOOPSTATS]
-    return SourceSelection(used, others, notes, tuple(unlike_their_peers(loops, others)))
+    apart = dict(disagreeing((*used, *others)))
+    doubted = (*unlike_their_peers(loops, others), *(s for n, s in apart.items() if n == name))
+    reserved = tuple(said for other, said in apart.items() if other != name)
+    return SourceSelection(used, others, notes, doubted, reserved)
 
 
 def _by_own_reference(one: ClockSeries) -> ClockSeries:
@@ -210,6 +233,11 @@ def _follows(used: Sequence[ClockSeries]) -> Iterator[str]:
     if own:
         yield (f"the clock follows its own reference ({', '.join(own)}): an error of that one (its "
                "cable, edge or receiver) shows in none of its offsets")  # fmt: skip
+    masters = sorted({r for one in used if one.kind.family == "linuxptp" for r in one.references})
+    if len(masters) > 1:
+        yield (f"the master changes ({', '.join(masters[:MOST_NAMED])}"
+               f"{', ...' if len(masters) > MOST_NAMED else ''}): offsets are against whichever "
+               "it was, and how far these are from one another is none of the claim")  # fmt: skip
     cards = [one for one in used if one.kind.family == "linuxptp" and not one.kind.of_host]
     if cards and cards[0].kind.name.startswith(("ptp4l", "ts2phc")):
         yield (f"{cards[0].kind.name} tells of a card, or does not say of what: how far the "
@@ -262,7 +290,7 @@ def _sum(system: ClockSeries, card: ClockSeries) -> ClockSeries | None:
     begin[:1] = True
     files = tuple(dict.fromkeys((*system.files, *card.files)))
     return replace(
-        system, kind=kind, files=files, restart=begin,
+        system, kind=kind, files=files, restart=begin, references=card.references,
         locked=system.locked & locked & (apart <= reach),
         offset_s=system.offset_s + np.interp(system.time_s, known.time_s, known.offset_s),
         hard_s=system.hard_s + np.interp(system.time_s, known.time_s, known.hard_s),

@@ -16,6 +16,7 @@ from syncline_design.clocks.doubts import doubts
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.reading import read_logs
 from syncline_design.clocks.remarks import MOST_EVENTS, SeenFigures, remarks
+from syncline_design.clocks.reservations import reservations
 from syncline_design.clocks.result import (
     ClockEntryKind,
     EventResult,
@@ -104,6 +105,7 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     claimable = not doubted and course.forbids is None
     figures = _figures(counted, sessions, settings, course.effective, claimable=claimable)
     claim = _claim(counted, chosen, settings, figures, (doubted, course))
+    reserved = (*chosen.reservations, *reservations(sessions))
     results = tuple(_session(s, settings.coverage) for s in sessions)
     seen = SeenFigures(figures.quantiles, figures.bound_s, figures.statistical_s, figures.hard_s,
                        settings.gap_s)  # fmt: skip
@@ -125,8 +127,14 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
         conditions=settings.conditions,
         evidence=logs.files,
         doubts=doubted,
-        notes=(*logs.notes, *chosen.notes, *remarks(sessions, results, seen), *course.words),
-        reservations=tuple(course.reservations),
+        notes=(
+            *logs.notes,
+            *chosen.notes,
+            *reserved,
+            *remarks(sessions, results, seen),
+            *course.words,
+        ),
+        reservations=(*course.reservations, *reserved),
         version=__version__,
     )
     return TimingStudy(timing, _distribution(counted))
