@@ -62,5 +62,6 @@ def _beyond(one: ClockSeries, tracked: Array) -> Array:
     )
     off = np.abs(one.offset_s)
     own = np.nan_to_num(one.hard_s - off)
-    told: Array = np.column_stack([off, bound, off - bound - own])
-    return told[near & one.locked & np.isfinite(off)]
+    rows = near & one.locked & np.isfinite(off)
+    told: Array = np.column_stack([off, bound, off - bound - own])[rows]
+    return told
