@@ -99,9 +99,12 @@ def test_a_recording_without_places_is_read_for_its_stamps(
     assert "no log of places" in said
 
 
-def test_a_recording_s_files_are_named_by_their_contents(tmp_path: Path, recording: Path) -> None:
+@pytest.mark.parametrize("only", [(), ("--only", "timing")])
+def test_a_recording_s_files_are_named_by_their_contents(
+    tmp_path: Path, recording: Path, only: tuple[str, ...]
+) -> None:
     """A folder has no SHA-256; each of its files has."""
-    result, _ = accepted(spec(tmp_path), recording)
+    result, _ = accepted(spec(tmp_path), recording, *only)
     found = {(one["file"], one["read_as"], one["sha256"]) for one in result["evidence"]}
     there = [path for path in recording.iterdir() if path.is_file()]
     assert len(there) == 2

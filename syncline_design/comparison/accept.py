@@ -92,8 +92,8 @@ def accept(
     every = assumptions(case, verdict, files.clocks)
     rests_on = [one for one in every if one.name in settings.asked]
     evidence = _evidence(case, files, settings, rests_on, seed)
-    if evidence.no_places:
-        files = replace(files, places=())
+    if evidence.log is None:
+        files = replace(files, places=())  # as none was read as such
     in_force().doing("weighing the evidence")
     single = tuple(_row(case, one, evidence, seed) for one in rests_on)
     rows, groups = _in_groups(case, single, every, evidence)
