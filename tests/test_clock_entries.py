@@ -294,3 +294,60 @@ def test_no_entry_is_written_by_an_id_that_catalogs_refuse(tmp_path: Path, ident
     done = run("timing", *logs, "--as", identity, "--write-catalog", entry)
     assert (done.exit_code, done.stdout, entry.exists()) == (2, "", False)
     assert "not an id; expected lower case" in done.stderr
+
+
+def _noted(folder: Path, off_s: float, other_s: float) -> list[Path]:
+    """Seven sessions in lock; of each five rows off by so much, and another server's statistics."""
+    paths = []
+    for k in range(7):
+        source = np.random.default_rng(k)
+        times = START + 86400.0 * k + 60.0 * np.arange(400)
+        late = source.normal(0.0, 1e-4, 400)
+        late[200:205] += off_s
+        lines = [made.tracking_line(t, x, hard_s=8e-4) for t, x in zip(times, late, strict=True)]
+        paths.append(write(folder / f"tracking_{k}.log", lines))
+        other = [made.statistics_line(t, other_s).replace("192.0.2.1 ", "192.0.2.9 ")
+                 for t in times]  # fmt: skip
+        paths.append(write(folder / f"statistics_{k}.log", other))
+    return paths
+
+
+@pytest.mark.parametrize(
+    ("off_s", "other_s", "codes"),
+    [
+        (0.0, 0.0, set()),
+        (0.02, 0.0, {"measured-events"}),
+        (0.0, 0.03, {"measured-reserved"}),
+    ],
+)
+def test_what_timing_said_of_the_logs_stays_with_the_entry(
+    off_s: float, other_s: float, codes: set[str], tmp_path: Path
+) -> None:
+    """A step of 20 ms for five minutes of 400; another server 30 ms off."""
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(SPEC, "utf-8")
+    entry = tmp_path / "own_clock.yaml"
+    done = run("timing", *_noted(tmp_path, off_s, other_s), "--as", "own_clock",
+               "--write-catalog", entry, "--coverage", "0.96", "--use", "statistical")  # fmt: skip
+    assert done.exit_code == 0, done.stdout + done.stderr
+    verdict = json.loads(run("check", spec, "-o", "json:-").stdout)
+    said = {w["code"]: w["message"] for w in verdict["warnings"]}
+    assert {"measured-events", "measured-reserved"} & set(said) == codes
+    assert ("20" in said.get("measured-events", "")) == ("measured-events" in codes)
+    assert ("192.0.2.9" in said.get("measured-reserved", "")) == ("measured-reserved" in codes)
+    assert "measured-altered" not in said
+
+
+def test_values_of_an_entry_hold_what_the_clock_ran_off_by(tmp_path: Path) -> None:
+    """Late by up to 20 ms in a silence of two thirds of the log: a quarter of it beyond 12 ms."""
+    paths = []
+    for k in range(5):
+        times = START + 86400.0 * k + 60.0 * np.arange(200)
+        times[100:] += 24_000.0
+        late = np.random.default_rng(k).normal(0.0, 1e-5, 200)
+        late[100] = 0.02
+        lines = [made.tracking_line(t, x, hard_s=8e-4) for t, x in zip(times, late, strict=True)]
+        paths.append(write(tmp_path / f"tracking_{k}.log", lines))
+    values = study_logs(paths, TimingSettings()).offsets_s
+    assert np.mean(values < -0.012) == pytest.approx(2.0 / 3.0 * 0.4, abs=0.02)
+    assert np.max(values) < 1e-3

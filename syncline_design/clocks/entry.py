@@ -93,7 +93,7 @@ def write_entry(study: TimingStudy, timing: Timing, files: EntryFiles) -> None:
 def values_text(study: TimingStudy, kind: ClockEntryKind) -> str:
     """Quantiles of the error, one a line; of a method mu = -offset (valid at stamp + mu)."""
     meaning = "host minus UTC" if kind == "clock" else "mu: data were valid at their stamp plus mu"
-    lines = [f"# {meaning}, quantiles of the steady state, each session with the same weight", "s"]
+    lines = [f"# {meaning}, quantiles of the time in lock, each session with the same weight", "s"]
     lines += [f"{value:.9g}" for value in values_of(study, kind)]
     return "\n".join(lines) + "\n"
 
@@ -122,6 +122,7 @@ def entry_text(
         "      distribution: empirical",
         f"      file: {_quoted(values_file)}",
         f"      bound: {_time(timing.bound_s or 0.0)}",
+        *_event_bound(timing),
         "      claim:",
         *(f"        {name}: {value}" for name, value in _claim(timing)),
         "      evidence:",
@@ -185,7 +186,16 @@ def _claim(timing: Timing) -> list[tuple[str, str]]:
     if timing.declared:
         terms = ", ".join(f"{_quoted(k)}: {_time(v)}" for k, v in timing.declared.items())
         found.append(("declared", f"{{{terms}}}"))
+    if timing.reservations:
+        words = ", ".join(_quoted(one) for one in timing.reservations)
+        found.append(("reservations", f"[{words}]"))
     return found
+
+
+def _event_bound(timing: Timing) -> list[str]:
+    """Where it is more than the bound."""
+    most = timing.event_bound_s or 0.0
+    return [f"      event_bound: {_time(most)}"] if most > (timing.bound_s or 0.0) else []
 
 
 def _events(timing: Timing) -> list[str]:

@@ -89,10 +89,16 @@ class ClockSession:
 
         In a silence it is taken to go evenly from what was seen before to what was seen after.
         """
+        offsets, weights = self.told
+        return weighted_quantile(np.abs(offsets), weights, share)
+
+    @property
+    def told(self) -> tuple[Array, Array]:
+        """Offsets of all the time in lock, and for how long each [s]: of steady state, a slow start
+        and silences."""
         rows = self.steady | self.slow
-        sizes = np.concatenate([np.abs(self.series.offset_s[rows]), self.silences[:, 0]])
-        weights = np.concatenate([self.weight_s[rows], self.silences[:, 1]])
-        return weighted_quantile(sizes, weights, share)
+        offsets = np.concatenate([self.series.offset_s[rows], self.silences[:, 0]])
+        return offsets, np.concatenate([self.weight_s[rows], self.silences[:, 1]])
 
     @property
     def start_s(self) -> float:
@@ -102,9 +108,7 @@ class ClockSession:
     @property
     def in_lock_s(self) -> float:
         """For how much of its time it says how far off the clock was while it was in lock."""
-        rows = self.steady | self.slow
-        told = float(np.sum(self.weight_s[rows]) + np.sum(self.silences[:, 1]))
-        return min(told, self.duration_s)
+        return min(float(np.sum(self.told[1])), self.duration_s)
 
     @property
     def hard_s(self) -> float:
@@ -214,7 +218,8 @@ def _silences(series: ClockSeries, steady: Flags, longest: float) -> Array:
     parts = np.arange(1, PIECES + 1) / PIECES
     sizes = low[:, None] + (high - low)[:, None] * parts
     lengths = np.repeat(steps[places] / PIECES, PIECES)
-    found: Array = np.column_stack([sizes.ravel(), lengths])
+    signs = np.where(before > after, *np.sign(series.offset_s[[places, places + 1]]))
+    found: Array = np.column_stack([(sizes * signs[:, None]).ravel(), lengths])
     return found
 
 

@@ -351,12 +351,12 @@ def _trace(sessions: Sequence[ClockSession]) -> tuple[TracePoint, ...]:
 
 
 def _distribution(counted: Sequence[ClockSession]) -> Array:
-    """Quantiles of the steady offsets, every session with the same weight."""
+    """Quantiles of the offsets in lock, every session with the same weight."""
     if not counted:
         return np.zeros(0)
-    offsets = np.concatenate([s.offsets for s in counted])
-    weights = np.concatenate([s.weight_s[s.steady] / np.sum(s.weight_s[s.steady])
-                              for s in counted])  # fmt: skip
+    told = [s.told for s in counted]
+    offsets = np.concatenate([one for one, _ in told])
+    weights = np.concatenate([weight / np.sum(weight) for _, weight in told])
     order = np.argsort(offsets, kind="stable")
     heaped = np.cumsum(weights[order])
     levels = (np.arange(VALUES) + 0.5) / VALUES * heaped[-1]

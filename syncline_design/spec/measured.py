@@ -53,6 +53,7 @@ class MeasuredClaim(FileRecord):
     `bound` for a share `coverage` of their time.
 
     rests_on: servo (its own offsets, which it nulls), independent, or with declared terms.
+    reservations: what kept the logs from bearing the bound out, as `timing` said.
     """
 
     coverage: Share
@@ -65,6 +66,7 @@ class MeasuredClaim(FileRecord):
     declared: dict[NonEmptyText, NonNegativeTime] = Field(default_factory=dict)
     made: bool | None = None
     needs_sessions: Annotated[int, Field(ge=0)] | None = None
+    reservations: tuple[NonEmptyText, ...] = ()
 
     @property
     def session_s(self) -> float | None:
@@ -98,11 +100,14 @@ class MeasuredEvent(FileRecord):
 class MeasuredKeys(FileRecord):
     """Keys of an error that was measured; `bound` replaces the distribution's own as tau.
 
+    event_bound: how far off it was, or may have been, in slow starts, steps and without lock.
+
     digest: of the figures as `timing` wrote them, so that one that was changed since is told.  It
     is a seal against slips and not against forgery: whoever can write the file can make it anew.
     """
 
     bound: NonNegativeTime | None = None
+    event_bound: NonNegativeTime | None = None
     claim: MeasuredClaim | None = None
     evidence: tuple[MeasuredLog, ...] = ()
     conditions: str | None = None

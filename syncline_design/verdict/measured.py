@@ -104,6 +104,21 @@ def claim_cautions(case: Case, entries: Sequence[UsedEntry]) -> Iterator[Caution
                           entry=used.id, key=key)  # fmt: skip
         yield from _changed_logs(case, used, error, key)
         yield from _of_entry(case, used, error.claim, key)
+        yield from _of_its_logs(used, error, key)
+
+
+def _of_its_logs(used: UsedEntry, error: TimestampError, key: str) -> Iterator[Caution]:
+    """What `timing` said of the logs: events beyond the bound, and what it was reserved about."""
+    bound, most = error.bound, error.event_bound
+    if bound is not None and most is not None and most > bound:
+        message = (
+            f"{used.id}: its logs show up to {format_duration(float(most))}, or cannot exclude it, "
+            "in slow starts, steps and without lock, beyond the bound of "
+            f"{format_duration(float(bound))} that is taken"
+        )
+        yield Caution("measured-events", message, entry=used.id, key=key)
+    for said in () if error.claim is None else error.claim.reservations:
+        yield Caution("measured-reserved", f"{used.id}: {said}", entry=used.id, key=key)
 
 
 def _changed_logs(
