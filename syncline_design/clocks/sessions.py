@@ -218,7 +218,7 @@ def _silences(series: ClockSeries, steady: Flags, longest: float) -> Array:
     parts = np.arange(1, PIECES + 1) / PIECES
     sizes = low[:, None] + (high - low)[:, None] * parts
     lengths = np.repeat(steps[places] / PIECES, PIECES)
-    signs = np.where(before > after, *np.sign(series.offset_s[[places, places + 1]]))
+    signs = np.sign(series.offset_s[np.where(before > after, places, places + 1)])
     found: Array = np.column_stack([(sizes * signs[:, None]).ravel(), lengths])
     return found
 
