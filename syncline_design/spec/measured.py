@@ -179,8 +179,11 @@ def _plain(value: Any) -> Any:
 def changed_logs(error: MeasuredKeys, folder: Path) -> Iterator[str]:
     """Logs that are where the entry names them, seen from its folder, with another content."""
     for log in error.evidence:
+        path = folder / log.file
         try:
-            with (folder / log.file).open("rb") as stream:
+            if not path.is_file():  # never wait for a pipe, nor read a device to its end
+                continue
+            with path.open("rb") as stream:
                 found = hashlib.file_digest(stream, "sha256").hexdigest()
         except (OSError, ValueError):  # not there any more, or never
             continue
