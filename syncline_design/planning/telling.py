@@ -18,8 +18,9 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_digits, to_places
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
+from syncline_design.planning.areas import beyond_areas, tight_areas
 from syncline_design.planning.drives import DrivenLeg, WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
 from syncline_design.planning.from_diagnosis import cautions_of
@@ -136,7 +137,8 @@ class Telling:
             calm=in_calm_water(self.setup, found) if reached else None,
             cautions=(
                 *self._cautions(),
-                *self._beyond_areas(found.driven),
+                *beyond_areas(self.setup, found.driven),
+                *(() if reached or self.setup.inseparable else tight_areas(self.setup)),
                 *_out_of_sight(found.driven),
             )
             or None,
@@ -152,17 +154,6 @@ class Telling:
     def _cautions(self) -> tuple[str, ...]:
         found = self.setup.request.diagnosis
         return () if found is None else cautions_of(self.setup.case, self.setup.system, found)
-
-    def _beyond_areas(self, driven: Drive) -> Iterator[str]:
-        """Vehicles that leave their area, in words."""
-        for vehicle, states in zip(self.setup.world.vehicles, driven.states, strict=True):
-            taken = np.ptp(states.position_m[:, :2], axis=0)
-            if vehicle.area_m is not None and np.any(taken > vehicle.area_m):
-                own, most = (
-                    f"{to_places(north, 0)} m by {to_places(east, 0)} m"
-                    for north, east in (taken, vehicle.area_m)
-                )
-                yield f"The drive of {vehicle.stage} takes {own}, beyond its area of {most}."
 
     def _tolerance(self) -> dict[str, float]:
         pairs = zip(self.setup.goal.wanted, self.setup.goal.tolerance, strict=True)
