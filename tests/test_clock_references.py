@@ -205,3 +205,29 @@ def test_coarse_offsets_that_agree_by_chance_are_no_session_twice(
     copy = write(tmp_path / "copy.csv", [half[0], *half[300:1200]])
     with pytest.raises(BadInput, match="the same session as in"):
         study_logs([*paths, copy], TimingSettings())
+
+
+@pytest.mark.parametrize(("apart_ppm", "said"), [(5.0, False), (47.0, True)])
+def test_crystals_that_stand_far_apart_are_said(
+    apart_ppm: float, said: bool, tmp_path: Path
+) -> None:
+    """-12 and 35 ppm by turns: the logs of two hosts."""
+    paths = []
+    for k in range(6):
+        lines = [made.tracking_line(t, x, hard_s=6e-4)
+                 for t, x in zip(_times(k), _late(k), strict=True)]  # fmt: skip
+        lines = [x.replace(" -3.114 ", f" {apart_ppm * (k % 2):.3f} ") for x in lines]
+        paths.append(write(tmp_path / f"tracking_{k}.log", lines))
+    notes = study_logs(paths, TimingSettings()).timing.notes
+    assert any("are these several hosts" in note for note in notes) is said
+
+
+def test_shuffled_sessions_are_one_doubt(tmp_path: Path) -> None:
+    """The sessions of one table stand in no order: the first place is named, and how often."""
+    lines = []
+    for day in (5, 3, 4, 1, 0):
+        lines += [made.tracking_line(t, x, hard_s=6e-4)
+                  for t, x in zip(_times(day), _late(day), strict=True)]  # fmt: skip
+    found = study_logs([write(tmp_path / "tracking.log", lines)], TimingSettings()).timing
+    (doubt,) = [said for said in found.doubts if "go back" in said]
+    assert "and 2 times more" in doubt

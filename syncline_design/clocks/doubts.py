@@ -43,12 +43,17 @@ def doubts(series: Sequence[ClockSeries], sessions: Sequence[ClockSession]) -> t
 
 
 def _stamps(one: ClockSeries) -> Iterator[str]:
-    for time_s, back_s in went_back(one):
+    found = went_back(one)
+    for time_s, back_s in found[:1]:
         hours = back_s / 3600.0
         dst = abs(hours - round(hours)) * 3600.0 < 60.0 and round(hours) in (1, 2)
         why = "local time set back (DST)? give stamps in UTC" if dst else "was the clock set?"
         yield (f"{one.kind.name}: the stamps go back by {format_duration(back_s)} at "
-               f"{moment(time_s, one.kind.stamps)}: {why}")  # fmt: skip
+               f"{moment(time_s, one.kind.stamps)}{_times(len(found))}: {why}")  # fmt: skip
+
+
+def _times(count: int) -> str:
+    return "" if count < 2 else f", and {count - 1} times more"
 
 
 def _summer_time(one: ClockSeries) -> Iterator[str]:

@@ -16,6 +16,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
 
 MOST_EVENTS: Final = 1000
+ONE_CRYSTAL: Final = 3e-5  # [s/s], range of an AT-cut crystal from -20 to 70 degC, about
 APART: Final = 3.0  # times the next largest session, from which one alone makes a bound wide
 LONG_ENOUGH: Final = 10.0  # times what a session remembers
 
@@ -35,7 +36,7 @@ def remarks(
     sessions: Sequence[ClockSession], results: Sequence[SessionResult], figures: SeenFigures
 ) -> list[str]:
     """Every one a sentence without its stop."""
-    said = [*_outages(sessions, figures.gap_s)]
+    said = [*_outages(sessions, figures.gap_s), *_other_crystals(sessions)]
     short = sum(not s.is_counted for s in sessions)
     if short:
         said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
@@ -82,6 +83,17 @@ def _stands_apart(sessions: Sequence[ClockSession], quantiles: Array) -> str:
     sizes = [format_duration(rounded(float(quantiles[k]), 3)) for k in (order[-1], order[-2])]
     return (f"; the session from {begin} alone makes it so wide ({sizes[0]}, the others "
             f"{sizes[1]} at most): see what happened there")  # fmt: skip
+
+
+def _other_crystals(sessions: Sequence[ClockSession]) -> Iterator[str]:
+    """Corrections of the frequency that one crystal seldom needs, by session."""
+    counted = [one.series.rate[one.steady] for one in sessions if one.is_counted]
+    rates = [float(np.nanmedian(one)) for one in counted if np.any(np.isfinite(one))]
+    apart = max(rates) - min(rates) if rates else 0.0
+    if apart > ONE_CRYSTAL:
+        yield (f"the sessions' frequency corrections stand {to_digits(1e6 * apart, 3)} ppm apart, "
+               "more than one crystal's in common weather: are these several hosts?"
+               )  # fmt: skip
 
 
 def _outages(sessions: Sequence[ClockSession], gap_s: float) -> Iterator[str]:
