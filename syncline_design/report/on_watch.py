@@ -11,6 +11,7 @@ from syncline_design.diagnosis.result import BlindSpot, UnlikeOthers
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
+from syncline_design.model.figure_text import format_estimates
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
@@ -212,8 +213,9 @@ def _alarms(found: Watch) -> list[Node]:
 def _alarm(one: Alarm) -> Node:
     what = "Departure" if one.alone else "Change"
     facts: list[tuple[str, str]] = [(f"{what} of {_parameter(one)}", one.text)]
-    if one.interval95 is not None:
-        low, high = (numbers.si_quantity(end, one.unit, 3) for end in one.interval95)
+    if one.interval95 is not None and one.change is not None:
+        ends = ((value, None) for value in (one.change, *one.interval95))  # in the change's unit
+        _, low, high = map(numbers.typeset, format_estimates(tuple(ends), one.unit))
         facts.append(("95 % interval", f"{low} to {high}"))
     since = f"run {one.since.run}, {one.since.file}"
     facts.append(
