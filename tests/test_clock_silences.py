@@ -76,6 +76,13 @@ def _restarted(lines: list[str]) -> list[str]:
     return lines
 
 
+def _unreachable(lines: list[str]) -> list[str]:
+    """chronyd says so after the silence, and is in lock again one line later."""
+    lost = " ".join([*lines[ROWS].split()[:2], "0.0.0.0 0 -3.114 0.05 0.0 ? 0 0.0 0.0 1.0 1.0 1.5"])
+    found = _restarted(lines)
+    return [*found[:ROWS], lost, *found[ROWS:]]
+
+
 @pytest.mark.parametrize(
     ("change", "sessions", "why"),
     [
@@ -86,6 +93,7 @@ def _restarted(lines: list[str]) -> list[str]:
         (lambda lines: [*lines[:20], made.BANNER, *lines[20:40], made.BANNER, *lines[40:ROWS],
                         made.BANNER, *lines[ROWS:]], 1, "each 20 lines"),
         (_restarted, 2, "root dispersion of 1 s"),
+        (_unreachable, 1, "root dispersion of 1 s of a daemon that lost its server"),
     ],
 )  # fmt: skip
 def test_what_tells_of_a_start_of_chronyd(
@@ -96,6 +104,15 @@ def test_what_tells_of_a_start_of_chronyd(
     log = write(tmp_path / "tracking.log", [made.BANNER, *change(lines)])
     (series,) = read_logs([log]).series
     assert len(sessions_of(series, 3600.0)) == sessions, why
+
+
+def test_a_file_that_begins_between_two_banners_tells_of_no_start(tmp_path: Path) -> None:
+    """Its first banner comes in turn, for all that it shows: it was cut, or copied and emptied."""
+    times, late = _run(0, AWAY_S, 0.0)
+    lines = [made.tracking_line(t, x, hard_s=6e-4) for t, x in zip(times, late, strict=True)]
+    log = write(tmp_path / "tracking.log", [*lines[45:ROWS], made.BANNER, *lines[ROWS:]])
+    (series,) = read_logs([log]).series
+    assert len(sessions_of(series, 3600.0)) == 1
 
 
 def test_a_start_in_the_tracking_log_is_one_of_the_other_logs(tmp_path: Path) -> None:

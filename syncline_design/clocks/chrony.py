@@ -44,6 +44,8 @@ class ChronyReader:
     after_banner: bool = False
     named: set[str] = field(default_factory=set)  # sources since the last banner
     anew: bool = False
+    counted: bool = False  # a file may begin between two banners
+    in_lock: bool = True  # of the tracking log, before this line
     last_s: float = float("nan")
 
     def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
@@ -58,14 +60,18 @@ class ChronyReader:
         if self.after_banner:
             self._turn(said.time_s)
         self.lines, self.last_s = self.lines + 1, said.time_s
-        opened = said.opened or (self.anew and kind.name not in self.named)
+        # without a reference chronyd's dispersion is 1 s as well: no start where it was so before
+        by_bound = said.opened and said.locked and self.in_lock
+        opened = by_bound or (self.anew and kind.name not in self.named)
+        self.in_lock = said.locked
         self.named.add(kind.name)
         return kind, said._replace(opened=opened), reference
 
     def _turn(self, time_s: float) -> None:
         if time_s - self.last_s <= _CYCLE_S:
             self.turns.add(self.lines)
-        self.anew = self.lines > 0 and self.lines not in self.turns
+        self.anew = self.counted and self.lines not in self.turns
+        self.counted = True
         self.after_banner, self.lines = False, 0
         self.named.clear()
 
