@@ -13,9 +13,10 @@ from syncline_design.machine.deadline import NoVerdict
 from syncline_design.planning import enough
 from syncline_design.planning.drives import MOST_ROWS, World, whole_information
 from syncline_design.planning.effort import Effort
+from syncline_design.planning.others import Others
 from syncline_design.planning.placing import LegTold
 from syncline_design.planning.run import plan as planned
-from syncline_design.planning.search import Others, PlanJudge
+from syncline_design.planning.search import PlanJudge
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.standard import Lines, legs_needed, times_needed
 from syncline_design.planning.telling import PlanRun

@@ -133,6 +133,15 @@ class DearLeg(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Untold(Record):
+    """Another effect that no drive tells from some of what is asked: with it free, as large as is
+    plausible, what is asked stays this uncertain (by its name, SI)."""
+
+    effect: str
+    sigma: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class CalmWater(Record):
     """A drive in calm water: whether it is enough there, and what it lacks where it is not."""
 
@@ -166,7 +175,8 @@ class Plan(Record):
     surveyed: whether the targets were there already, and the drive is laid beside them.  sized:
     whether pairs are judged at a size that is known, beyond first order.  cautions: where what the
     plan was given may not be of this system.  alike: of the inseparable ones those that make the
-    same error on every leg that this platform can drive.
+    same error on every leg that this platform can drive.  untold: what has to be known otherwise,
+    since no drive tells it from what is asked.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -198,6 +208,7 @@ class Plan(Record):
     alike: tuple[str, ...] | None = optional()
     dear: tuple[DearLeg, ...] | None = optional()
     calm: CalmWater | None = optional()
+    untold: tuple[Untold, ...] | None = optional()
 
     @property
     def exit_code(self) -> int:

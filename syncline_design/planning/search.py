@@ -15,20 +15,19 @@ from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import Deadline
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.effort import Effort
 from syncline_design.planning.information import (
-    Unknown,
     canonical_correlation,
     covariance_of,
     noncentrality,
     schur,
     sigmas,
 )
+from syncline_design.planning.others import TWICE, VAGUE, Others
 from syncline_design.planning.placing import (
     LegTold,
     Place,
@@ -47,9 +46,6 @@ MARGIN: Final = 0.95  # of what is asked that a search aims at first, for the jo
 LEAST_GAIN: Final = 1e-4
 SWEEPS: Final = 3
 MOST_EXCHANGED: Final = 12
-INSEPARABLE: Final = 20.0  # times wider: what no drive of the library tells apart
-WIDENED: Final = 3.0  # times that one other effect may widen a sigma
-VAGUE: Final = 30.0  # times the prior: of what a search has not seen yet
 CONFUSED: Final = 0.05  # weight of what other effects take of what is wanted
 
 
@@ -57,55 +53,6 @@ def together(sequence: Sequence[LegTold]) -> Array:
     """Information of all legs."""
     total: Array = np.sum([p.told.at(p.heading, p.start_s) for p in arranged(sequence)], axis=0)
     return total if sequence else np.zeros(())
-
-
-@dataclass(frozen=True, slots=True)
-class Others:
-    """All effects besides those asked for, one by one: where their parameters stand (f, 3), -1
-    where there are fewer, and by how much each may widen the sigmas of what is wanted (f, w).
-
-    What even the whole library of legs cannot tell from what is wanted is not among them.
-    """
-
-    index: NDArray[np.int64]
-    limit: Array
-
-    def widened(self, information: Array, wanted: Sequence[int], vague: Array) -> Array:
-        """Sigmas (f, w) of what is wanted with each other effect free."""
-        count, width = self.index.shape[0], len(wanted)
-        size = width + self.index.shape[1]
-        every = np.concatenate([np.tile(wanted, (count, 1)), self.index], axis=1)
-        known = every >= 0
-        both = known[:, :, None] & known[:, None, :]
-        parts = np.where(both, information[every[:, :, None], every[:, None, :]], 0.0)
-        diagonal = np.einsum("fii->fi", parts)
-        diagonal += np.where(known, vague[every] ** -2.0, 1.0)
-        scale = np.sqrt(diagonal)
-        inverse = np.linalg.inv(parts / scale[:, :, None] / scale[:, None, :])
-        variance = np.einsum("fii->fi", inverse) / scale**2
-        assert variance.shape == (count, size)
-        return np.asarray(np.sqrt(np.maximum(variance[:, :width], 0.0)))
-
-
-def others_of(every: Sequence[Unknown], goal: Goal, library: Array, prior: Array) -> Others:
-    """The other effects that some drive tells from what is wanted; library: all legs together."""
-    asked = {every[k].candidate.label for k in goal.wanted}
-    places: dict[tuple[str, str, int], list[int]] = {}
-    for k, one in enumerate(every):
-        if one.candidate.label not in asked:
-            places.setdefault(one.candidate.label, []).append(k)
-    if not places:
-        return Others(np.zeros((0, 1), dtype=np.int64), np.zeros((0, len(goal.wanted))))
-    width = max(len(found) for found in places.values())
-    index = np.array([[*found, *[-1] * (width - len(found))] for found in places.values()])
-    found = Others(index, np.zeros((0, 0)))
-    wanted = list(goal.wanted)
-    covariance, _ = covariance_of(library[np.ix_(wanted, wanted)], VAGUE * prior[wanted])
-    inflation = found.widened(library, wanted, VAGUE * prior) / np.sqrt(np.diag(covariance))
-    limit = np.where(inflation < INSEPARABLE, np.maximum(WIDENED, 1.5 * inflation), np.inf)
-    limit[:, goal.only_rival] = np.inf
-    kept = np.any(np.isfinite(limit), axis=1)
-    return Others(index[kept], limit[kept])
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +83,8 @@ class PlanJudge:
         share = widened / np.sqrt(np.diag(covariance)) / self.others.limit
         asked = np.isfinite(self.goal.tolerance)
         within = np.where(np.isinf(self.others.limit), 0.0, widened)
-        held = within / np.where(asked, 2.0 * self.goal.tolerance, 1.0)
-        return np.asarray(np.where(asked, np.minimum(share, held), share))
+        held = within / np.where(asked, TWICE * self.goal.tolerance, 1.0)
+        return np.asarray(np.where(asked, held, share))
 
     def enough(self, information: Array) -> bool:
         """Whether all that is asked is reached, and told from every other effect: the one rule for

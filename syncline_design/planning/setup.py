@@ -30,9 +30,10 @@ from syncline_design.planning.information import (
     rms_per_unit,
 )
 from syncline_design.planning.legs import MOST_LEG_S, Leg
+from syncline_design.planning.others import Others, others_of
 from syncline_design.planning.path import joined
 from syncline_design.planning.placing import LegTold
-from syncline_design.planning.search import PlanJudge, noncentrality_of, others_of, pair_ratio
+from syncline_design.planning.search import PlanJudge, noncentrality_of, pair_ratio
 from syncline_design.planning.vehicle import vehicles
 from syncline_design.planning.wanted import (
     Goal,
@@ -73,7 +74,10 @@ class PlanRequest:
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What a plan starts from: the world, what is asked of it, and every leg looked at."""
+    """What a plan starts from: the world, what is asked of it, and every leg looked at.
+
+    untold: other effects that no drive tells from some of what is asked.
+    """
 
     case: Case
     request: PlanRequest
@@ -83,6 +87,7 @@ class Setup:
     told: tuple[LegTold, ...]
     inseparable: tuple[str, ...]
     alike: tuple[str, ...]
+    untold: Others
 
     @classmethod
     def begun(cls, case: Case, request: PlanRequest) -> Setup:
@@ -104,8 +109,9 @@ class Setup:
         share = BEST_LEGS * SECONDS * request.minutes / (4.0 * sum(t.leg.duration_s for t in told))
         alike = tuple(_words(p) for p in goal.pairs if _is_one(library, p))
         goal, apart = _separable(goal, library, share)
-        others = others_of(world.every, goal, library, prior)
-        return cls(case, request, world, goal, PlanJudge(goal, prior, others), told, apart, alike)
+        others, untold = others_of(world.every, goal, library, prior)
+        judge = PlanJudge(goal, prior, others)
+        return cls(case, request, world, goal, judge, told, apart, alike, untold)
 
     @property
     def in_calm_water(self) -> Setup:

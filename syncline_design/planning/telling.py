@@ -30,6 +30,7 @@ from syncline_design.planning.information import (
     sigmas,
 )
 from syncline_design.planning.lacking import dear_legs, in_calm_water
+from syncline_design.planning.others import taken_by
 from syncline_design.planning.path import PathStates, unasked
 from syncline_design.planning.planned_log import Drive
 from syncline_design.planning.result import (
@@ -41,6 +42,7 @@ from syncline_design.planning.result import (
     PlanProvenance,
     Separated,
     StandardPlan,
+    Untold,
 )
 from syncline_design.planning.search import (
     NONCENTRALITY,
@@ -135,6 +137,7 @@ class Telling:
             sized=bool(self.setup.world.beyond) or None,
             dear=tuple(dear_legs(self.setup, found)) or None if reached else None,
             calm=in_calm_water(self.setup, found) if reached else None,
+            untold=self._untold(found.after[-1]) or None,
             cautions=(
                 *self._cautions(),
                 *beyond_areas(self.setup, found.driven),
@@ -202,6 +205,17 @@ class Telling:
         """Effects that, left free alone, would take what is asked."""
         places = self.setup.judge.confusing(information)
         return tuple(text_of(self.setup.system, self.setup.world.every[k]) for k in places)
+
+    def _untold(self, information: Array) -> tuple[Untold, ...]:
+        """What has to be known otherwise, with what it would leave of what is asked."""
+        found = taken_by(self.setup.untold, self.setup.goal, information, self.setup.judge.prior)
+        return tuple(
+            Untold(
+                text_of(self.setup.system, self.setup.world.every[effect]),
+                {self.setup.keys[k]: sigma for k, sigma in taken.items()},
+            )
+            for effect, taken in found.items()
+        )
 
     def _unseen(self, information: Array) -> tuple[str, ...]:
         """Effects of whose parameters the drive tells too little, whole or some of them.

@@ -120,10 +120,13 @@ def _sentences(found: Plan) -> Iterator[Inline]:
         asked = "else that" if found.inseparable else "that"
         yield (
             f"All {asked} is asked is reached, and none of the other effects that a drive can tell "
-            f"apart would take it, left free one at a time{_steps(found)}."
+            f"apart would take it, left free one at a time{_steps(found)}"
+            f"{', beyond twice what is asked' if found.tolerance else ''}."
         )
     if found.confused:
         yield _would_take(found.confused)
+    if found.untold:
+        yield _known_otherwise(found)
     if found.calm is not None:
         yield from _in_calm_water(found)
     for one in found.dear or ():
@@ -168,6 +171,23 @@ def _steps(found: Plan) -> str:
 def _would_take(confused: Sequence[str]) -> str:
     names = ", ".join(map(effect_words, confused))
     return f"Left free one at a time, these would take what is asked: {names}."
+
+
+def _known_otherwise(found: Plan) -> str:
+    """What no drive tells from what is asked, with what it leaves of that where it is free."""
+    each = [
+        f"{effect_words(one.effect)} (would leave "
+        + ", ".join(
+            f"{parameter(key)} at {figure(key, sigma, found.tolerance.get(key))}"
+            for key, sigma in one.sigma.items()
+        )
+        + ")"
+        for one in found.untold or ()
+    ]
+    return (
+        "Taken as known, since no drive of this platform tells them from what is asked, or only "
+        f"one that takes many times as long: {'; '.join(each)}. Ask for them as well to have it."
+    )
 
 
 def _larger(found: Plan) -> Separated | None:
