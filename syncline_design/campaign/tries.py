@@ -14,9 +14,11 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.random import PCG64
 
 from syncline_design.campaign.pool import Pool, Term, inverted
 from syncline_design.effects.record import Array
+from syncline_design.machine.random_numbers import generator
 from syncline_design.model.distributions import chi_square_log_beyond
 
 DRAWS: Final = 4000
@@ -27,7 +29,7 @@ def tries_of(pool: Pool, terms: Sequence[Term], rate: float) -> float:
     if len(terms) < 2:
         return 1.0
     normal = pool.normal.sum(axis=0)
-    scores = np.random.default_rng(0).standard_normal((DRAWS, len(normal))) @ _root(normal)
+    scores = generator(0, bits=PCG64).standard_normal((DRAWS, len(normal))) @ _root(normal)
     least = np.min([_log_chances(normal, scores, term) for term in terms], axis=0)
     return float(np.clip(rate / np.exp(np.quantile(least, rate)), 1.0, len(terms)))
 

@@ -244,7 +244,9 @@ def rival_text(one: Rival, *, alike: bool = False) -> str:
 
 def _parameter_text(shown: Estimate) -> str:
     """`87.1 \u00b1 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
-    return shown.text if shown.seen else "not seen in this log"
+    if not shown.seen:
+        return "not seen in this log"
+    return shown.text if isinstance(shown.value, str) else numbers.typeset(shown.text)
 
 
 def regime_text(one: Regime) -> str:
