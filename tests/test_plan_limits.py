@@ -222,7 +222,7 @@ def test_a_drive_that_sees_no_target_for_long_says_so(tmp_path: Path) -> None:
     """From just below the highest height few are in sight; counted in what is written."""
     waypoints, page = tmp_path / "drive.csv", tmp_path / "drive.json"
     spec = spec_with(tmp_path, ("motion: multirotor", "motion: multirotor, height: 36.6 m"))
-    asked = ("--reach", "latency(position)=0.1 ms", "-q")
+    asked = ("--reach", "lever_arm(position)=1 mm", "-q")
     done = call(spec, *asked, "-o", f"csv:{waypoints}", "-o", f"json:{page}")
     assert done.exit_code in (0, 1), done.output
     with waypoints.open(encoding="utf-8", newline="") as stream:

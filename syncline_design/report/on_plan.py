@@ -185,8 +185,8 @@ def _known_otherwise(found: Plan) -> str:
         for one in found.untold or ()
     ]
     return (
-        "Taken as known, since no drive of this platform tells them from what is asked, or only "
-        f"one that takes many times as long: {'; '.join(each)}. Ask for them as well to have it."
+        "Taken as known, since nothing that can be driven tells them from what is asked, or only "
+        f"what takes many times as long: {'; '.join(each)}. Ask for them as well to have it."
     )
 
 
