@@ -34,6 +34,7 @@ from syncline_design.diagnosis.motion_columns import (
     with_slopes,
 )
 from syncline_design.diagnosis.noise_findings import episode_finding, with_unlike_readings
+from syncline_design.diagnosis.one_delay import with_one_delay
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import (
     covariates,
@@ -276,7 +277,7 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
         material=material,
     )
     checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
-    named = with_system_delay(named, data.view.log.kind)
+    named = with_system_delay(with_one_delay(named), data.view.log.kind)
     return WeighedUp(named, remaining, checks, before)
 
 
