@@ -181,3 +181,12 @@ def test_many_drives_looked_at_as_one_log_tell_what_each_tells(tractor: World) -
         size = np.sqrt(np.maximum(np.diag(whole), 1e-12))
         apart = np.abs(found - whole) / size / size[:, None]
         assert apart[np.ix_(kept, kept)].max() < 1e-6
+
+
+def test_what_begins_fast_says_its_run_up(tmp_path: Path) -> None:
+    """Of v at 0.6 of 0.8 m/s^2 from rest: v^2 / 0.96 m."""
+    wanted = PlanWanted((), separate_of("latency(position)=44.3 ms", RIVALS))
+    (leg,) = asked(tmp_path, wanted).result.legs
+    begins = float(leg.words.split(" in all: at ")[1].split(" m/s")[0])
+    run_up = float(leg.words.split("; before it a run-up of ")[1].split(" m ")[0])
+    assert run_up == pytest.approx(begins**2 / 0.96, rel=0.06)

@@ -52,6 +52,7 @@ from syncline_design.planning.search import (
 )
 from syncline_design.planning.setup import SECONDS, Setup
 from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
+from syncline_design.planning.swings import ALONG
 from syncline_design.planning.wanted import (
     PairGoal,
     PlanError,
@@ -269,13 +270,22 @@ class Telling:
         """What to do in a leg, from the turn on with which it begins."""
         angle = round(math.degrees(one.turn_rad))
         if angle == 0:
-            return one.leg.words
+            return one.leg.words + self._run_up(one)
         joins_mps = self.setup.world.vehicles[one.leg.stage].join_mps
         speed = joins_mps if one.leg.begins_mps is None else one.leg.begins_mps
         how = f"at {to_digits(speed, 2)} m/s" if speed else "on the spot"
         side = "right" if angle > 0 else "left"
         words = one.leg.words
         return f"Turn {side} by {abs(angle)} deg {how}, then {words[0].lower()}{words[1:]}"
+
+    def _run_up(self, one: DrivenLeg) -> str:
+        """What it takes to begin faster than the vehicle's slowest: (v^2 - v0^2) / (2 a), [m]."""
+        vehicle, begins_mps = self.setup.world.vehicles[one.leg.stage], one.leg.begins_mps or 0.0
+        if begins_mps <= vehicle.slowest_mps:
+            return ""
+        gained = begins_mps**2 - vehicle.slowest_mps**2
+        way_m = gained / (2.0 * ALONG * vehicle.acceleration_mps2)
+        return f"; before it a run-up of {to_digits(way_m, 2)} m straight on, not logged"
 
     def _meanwhile(self, stage: int) -> str:
         """What the other vehicles of a chain do."""

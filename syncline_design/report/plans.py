@@ -24,6 +24,7 @@ COLUMNS: Final = (
 )  # fmt: skip
 KML: Final = "http://www.opengis.net/kml/2.2"
 WAYPOINT, CHANGE_SPEED, TAKEOFF = 16, 178, 22  # MAV_CMD of MAVLink's common set
+AFLOAT = "surface"  # the motion of ships
 HEADING, REVERSE = 115, 194  # the same: CONDITION_YAW, DO_SET_REVERSE
 RELATIVE, MISSION = 3, 2  # MAV_FRAME: relative to home; of a command without a place
 GENERIC, FIXED_WING, QUADROTOR, ROVER, BOAT, SUBMARINE = 0, 1, 2, 10, 11, 12  # MAV_TYPE
@@ -153,7 +154,8 @@ def qgc(run: PlanRun) -> str:
     """
     items = list(_items(run))
     home = list(run.result.origin_deg_m or (0.0, 0.0, 0.0))
-    fast = float(np.max(np.linalg.norm(run.path.velocity_mps, axis=1)))
+    axes = 2 if run.motion == AFLOAT else 3
+    fast = float(np.max(np.linalg.norm(run.path.velocity_mps[:, :axes], axis=1)))
     mission = {
         "cruiseSpeed": round(fast, 2),
         "firmwareType": ARDUPILOT,
@@ -178,16 +180,16 @@ def qgc(run: PlanRun) -> str:
 
 def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
     """A take-off for what flies, then the speed to each place, how it is headed, and the place."""
-    path = run.path
-    places, height = geodetic(run, path.position_m), -path.position_m[:, 2]
+    path, commanded_m = run.path, _commanded(run)
+    places, height = geodetic(run, commanded_m), -commanded_m[:, 2]
     yaw = np.unwrap(path.euler_rad[:, 2])
     if run.motion in ("multirotor", "fixed_wing"):
         yield _item(TAKEOFF, [0, 0, 0, None, *_place(places[0], height[0])])
     said = -1.0
-    kept = corners(path.time_s, path.position_m, yaw if run.motion == "multirotor" else None)
+    kept = corners(path.time_s, commanded_m, yaw if run.motion == "multirotor" else None)
     headed = _headed(run, kept, yaw)
     for before, k in zip([0, *kept], kept, strict=False):
-        step = path.position_m[k] - path.position_m[before]
+        step = commanded_m[k] - commanded_m[before]
         lasts = float(path.time_s[k] - path.time_s[before])
         speed = round(float(np.linalg.norm(step)) / lasts, 2) if lasts > 0.0 else 0.0
         moving = speed > 0.05
@@ -198,6 +200,14 @@ def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
         hold = 0.0 if moving else round(lasts, 1)
         to = round(math.degrees(yaw[k]) % 360.0, 1)
         yield _item(WAYPOINT, [hold, 0, 0, to, *_place(places[k], height[k])])
+
+
+def _commanded(run: PlanRun) -> Any:
+    """Places that a vehicle is sent to (n, 3) [m]: no ship is told to heave."""
+    places = run.path.position_m
+    if run.motion != AFLOAT:
+        return places
+    return np.column_stack([places[:, :2], np.full(len(places), np.mean(places[:, 2]))])
 
 
 def _headed(run: PlanRun, kept: list[int], yaw: Any) -> dict[int, list[dict[str, Any]]]:
