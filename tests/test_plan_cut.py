@@ -163,7 +163,7 @@ def test_what_begins_at_rest_is_driven_straight_on_and_alone(tractor: World) -> 
     assert rise.words.endswith("back to rest")
     speed, _ = _level(travelled(one, rise.course))
     assert speed[-1] < 0.05 * speed.max()
-    told = tractor.untold(rise)
+    told = tractor.unjudged(rise)
     assert [way.heading for way in told.ways_from(0.0)] == [0]
     assert [way.turn_rad for way in told.ways_from(0.0)] == [0.0]
 
@@ -177,7 +177,7 @@ def test_many_drives_looked_at_as_one_log_tell_what_each_tells(tractor: World) -
     made = [leg for leg in legs if leg is not None]
     assert len(made) == len(SHAPES)
     for leg, found in zip(made, tractor.alone(made), strict=True):
-        whole = whole_information(tractor, [tractor.untold(leg)])
+        whole = whole_information(tractor, [tractor.unjudged(leg)])
         size = np.sqrt(np.maximum(np.diag(whole), 1e-12))
         apart = np.abs(found - whole) / size / size[:, None]
         assert apart[np.ix_(kept, kept)].max() < 1e-6

@@ -195,7 +195,8 @@ def slopes(view: Scene, acting: Sequence[Acting]) -> Array:
 
 
 def slopes_of(error: Callable[[Sequence[Acting]], Array], acting: Sequence[Acting]) -> Array:
-    """Minus the slope (n, 3, P) of what effects leave, an error of theirs (n, 3)."""
+    """Minus the slope (n, 3, P) by all continuous parameters of what effects leave; error: that,
+    (n, 3) [m]."""
     columns = []
     for i, one in enumerate(acting):
         for p in one.effect.slopes():

@@ -45,7 +45,7 @@ class Cutting:
 
     def shorter(self, than_s: float) -> list[Leg]:
         """Swings that are enough and save time that matters, the shortest first."""
-        most_s = SAVES * min(than_s, LONGEST_S / SAVES)
+        most_s = min(SAVES * than_s, LONGEST_S)
         every = [(stage, shape) for stage in self.stages for shape in SHAPES]
         found = self._down(every, most_s)
         for near, shares in FINER:

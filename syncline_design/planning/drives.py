@@ -210,7 +210,7 @@ class World:
         now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
         return self._placeable(leg, now, once, twice)
 
-    def untold(self, leg: Leg) -> LegTold:
+    def unjudged(self, leg: Leg) -> LegTold:
         """A leg with how it is placed alone, to ask whether it fits."""
         return self._placeable(leg, *(np.zeros((4, 1, 1)) for _ in range(3)))
 

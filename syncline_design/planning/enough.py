@@ -76,7 +76,7 @@ def _cut(search: LegSearch, whole: _Whole, enough: list[LegTold]) -> list[LegTol
     def enough_of(legs: Sequence[Leg]) -> list[Leg]:
         if search.deadline.is_over or search.effort.is_half_over:
             return []
-        fitting = [leg for leg in legs if search.fits([world.untold(leg)])]
+        fitting = [leg for leg in legs if search.fits([world.unjudged(leg)])]
         return [
             leg for leg, worst in zip(fitting, whole.roughly(fitting), strict=True) if worst <= AIM
         ]

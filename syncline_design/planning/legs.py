@@ -15,7 +15,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.planning.path import STEP_S, CourseCommands, rounded
-from syncline_design.planning.vehicle import GRAVITY_MPS2, Vehicle
+from syncline_design.planning.vehicle import ALONG, GRAVITY_MPS2, Vehicle
 
 LINE_S = 20.0
 SHORT_S = 4.0
@@ -58,7 +58,7 @@ def ramps(
 
     Raises LegTooLongError before anything of that length is made.
     """
-    slope = 0.6 * vehicle.acceleration_mps2
+    slope = ALONG * vehicle.acceleration_mps2
     at, parts = begins_mps, []
     every = [*steps, (begins_mps if ends_mps is None else ends_mps, 0.0)]
     speeds = [begins_mps, *(speed for speed, _ in every)]
@@ -145,7 +145,7 @@ def _reciprocal(v: Vehicle) -> tuple[str, CourseCommands]:
 
 def _stop_and_go(v: Vehicle) -> tuple[str, CourseCommands] | None:
     least = v.slowest_mps
-    reach = min(v.fast_mps, least + 0.6 * v.acceleration_mps2 * 5.0)
+    reach = min(v.fast_mps, least + ALONG * v.acceleration_mps2 * 5.0)
     if reach <= least * 1.1:
         return None
     ahead = ramps(v, [(reach, 1.0), (least, 1.0)] * 3, v.join_mps)
@@ -189,10 +189,10 @@ def _swinging_circle(v: Vehicle) -> tuple[str, CourseCommands] | None:
     """Three times slow and fast on one circle: speed and direction change at once, so that a short
     drive parts delays from lever arms.  It ends at a quarter of a turn.
 
-    Along 0.6 of the acceleration, across ACROSS = 0.8 of it, which are all of it together.
+    Along ALONG = 0.6 of the acceleration, across ACROSS = 0.8 of it, which are all of it together.
     """
     low = max(v.slowest_mps, 0.02 * v.v_max_mps)
-    high = max(min(v.fast_mps, low + 0.6 * v.acceleration_mps2 * SWING_S), v.join_mps)
+    high = max(min(v.fast_mps, low + ALONG * v.acceleration_mps2 * SWING_S), v.join_mps)
     if high <= 1.1 * low:
         return None
     ahead = ramps(v, [(high, 0.5), (low, 0.5)] * 3, v.join_mps)
@@ -237,7 +237,7 @@ def _eight(v: Vehicle) -> tuple[str, CourseCommands]:
 def _reverse(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if not v.usual.reverses or v.slowest_mps > 0.0:
         return None
-    speed = min(0.4 * v.v_max_mps, 0.6 * v.acceleration_mps2 * 4.0)
+    speed = min(0.4 * v.v_max_mps, ALONG * v.acceleration_mps2 * 4.0)
     ahead = ramps(v, [(speed, 2.0), (-speed, 2.0)] * 2, v.join_mps)
     return f"twice ahead and back astern at {speed_words(speed)}, the heading kept", course(ahead)
 
@@ -296,7 +296,7 @@ def _rock(v: Vehicle) -> tuple[str, CourseCommands] | None:
 def _heights(v: Vehicle) -> tuple[str, CourseCommands] | None:
     if not v.usual.climbs:
         return None
-    rate = min(0.15 * v.v_max_mps, 0.6 * v.acceleration_mps2 * 2.0, 0.04 * v.distance_m)
+    rate = min(0.15 * v.v_max_mps, ALONG * v.acceleration_mps2 * 2.0, 0.04 * v.distance_m)
     ahead = ramps(v, [(max(v.join_mps, 0.3 * v.fast_mps), LINE_S)], v.join_mps)
     down = rate * _wave(len(ahead) * STEP_S, 2)[: len(ahead)]
     down = np.pad(down, (0, len(ahead) - len(down)))

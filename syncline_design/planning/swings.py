@@ -20,13 +20,12 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 from syncline_design.planning.legs import Leg, LegTooLongError, course, ramps, speed_words
 from syncline_design.planning.path import STEP_S, rounded
-from syncline_design.planning.vehicle import Vehicle
+from syncline_design.planning.vehicle import ALONG, Vehicle
 
 NAME: Final = "swing of speed"
 QUICK_S: Final = 0.5  # rounding of commands of a vehicle that changes its speed quickly
 SLOWEST_SHARE: Final = 0.02  # of v_max: slower, little is left that a swing could change
 LEAST_SWING: Final = 1.1  # fast over slow
-ALONG: Final = 0.6  # of the acceleration, beside what turns take (`ramps`)
 HALVINGS: Final = 10
 FROM_FASTEST: Final = ("ease", "sag")
 AT_REST: Final = 0.005  # of the fastest: what rounding leaves of a stop

@@ -52,7 +52,7 @@ from syncline_design.planning.search import (
 )
 from syncline_design.planning.setup import SECONDS, Setup
 from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
-from syncline_design.planning.swings import ALONG
+from syncline_design.planning.vehicle import ALONG
 from syncline_design.planning.wanted import (
     PairGoal,
     PlanError,

@@ -19,6 +19,7 @@ Motion = Literal["multirotor", "fixed_wing", "ground", "surface", "underwater", 
 SHARE: Final = 0.9  # of v_max that a plan asks for: drivers and autopilots need room
 TURN_SHARE: Final = 0.75  # of omega_max, so that roll and pitch fit beside a turn
 ACROSS: Final = 0.8  # of the acceleration, for turns
+ALONG: Final = 0.6  # of it, for changes of speed: with turns beside them that is all of it
 SEA_TILT: Final = 3.0  # the horizon's tilt is so many standard deviations of the sea's motion
 SEA_RATE_SHARE: Final = 0.12  # of omega_max that the sea's own turn rate is at most (rms)
 MOST_TILT_RAD: Final = math.radians(30.0)

@@ -24,7 +24,6 @@ COLUMNS: Final = (
 )  # fmt: skip
 KML: Final = "http://www.opengis.net/kml/2.2"
 WAYPOINT, CHANGE_SPEED, TAKEOFF = 16, 178, 22  # MAV_CMD of MAVLink's common set
-AFLOAT = "surface"  # the motion of ships
 HEADING, REVERSE = 115, 194  # the same: CONDITION_YAW, DO_SET_REVERSE
 RELATIVE, MISSION = 3, 2  # MAV_FRAME: relative to home; of a command without a place
 GENERIC, FIXED_WING, QUADROTOR, ROVER, BOAT, SUBMARINE = 0, 1, 2, 10, 11, 12  # MAV_TYPE
@@ -154,7 +153,7 @@ def qgc(run: PlanRun) -> str:
     """
     items = list(_items(run))
     home = list(run.result.origin_deg_m or (0.0, 0.0, 0.0))
-    axes = 2 if run.motion == AFLOAT else 3
+    axes = 2 if run.motion == "surface" else 3
     fast = float(np.max(np.linalg.norm(run.path.velocity_mps[:, :axes], axis=1)))
     mission = {
         "cruiseSpeed": round(fast, 2),
@@ -205,7 +204,7 @@ def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
 def _commanded(run: PlanRun) -> Any:
     """Places that a vehicle is sent to (n, 3) [m]: no ship is told to heave."""
     places = run.path.position_m
-    if run.motion != AFLOAT:
+    if run.motion != "surface":
         return places
     return np.column_stack([places[:, :2], np.full(len(places), np.mean(places[:, 2]))])
 
