@@ -27,6 +27,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from benchmarks.accept_world import MOTIONS, NOISES, VEHICLES, Drive, Fault, Vehicle, write
+from benchmarks.docs_tables import put
 from benchmarks.study_scoring import proportion
 from syncline_design import __version__
 
@@ -312,10 +313,7 @@ def main() -> None:
     text = table(found, asked.seed)
     print(text)
     if asked.write is not None:
-        page = asked.write.read_text("utf-8")
-        before, _, rest = page.partition(BEGIN)
-        _, _, after = rest.partition(END)
-        asked.write.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", "utf-8")
+        put(asked.write, f"{text}\n", BEGIN, END)
 
 
 if __name__ == "__main__":

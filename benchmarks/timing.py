@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.docs_tables import put
 from syncline_design import __version__
 from syncline_design.clocks.tolerance import normal_factor, tolerance_bound
 
@@ -251,10 +252,7 @@ def main() -> None:
     text += f"\nMissed by the first six ({asked}):\n\n{said}\n"
     print(text)
     if chosen.write is not None:
-        page = chosen.write.read_text("utf-8")
-        head, _, rest = page.partition(BEGIN)
-        _, _, tail = rest.partition(END)
-        chosen.write.write_text(f"{head}{BEGIN}\n{text}{END}{tail}", "utf-8")
+        put(chosen.write, text, BEGIN, END)
 
 
 if __name__ == "__main__":

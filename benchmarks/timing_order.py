@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.docs_tables import put
 from benchmarks.timing import CONFIDENCE, COVERAGE, FAMILIES, SAMPLES, SHARE, SIGMA_S, Make
 from syncline_design import __version__
 from syncline_design.clocks.tolerance import tolerance_bound
@@ -151,10 +152,7 @@ def main() -> None:
     text = report(list(cells(chosen.studies, chosen.seed)), chosen.studies, chosen.seed)
     print(text)
     if chosen.write is not None:
-        page = chosen.write.read_text("utf-8")
-        head, _, rest = page.partition(BEGIN)
-        _, _, tail = rest.partition(END)
-        chosen.write.write_text(f"{head}{BEGIN}\n{text}{END}{tail}", "utf-8")
+        put(chosen.write, text, BEGIN, END)
 
 
 if __name__ == "__main__":
