@@ -36,6 +36,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
@@ -421,8 +422,7 @@ def _own_covariance(normal: Array, term: Term) -> Array:
 
 def pseudo_inverse(total: Array) -> Array:
     """total^-1 (..., P, P), columns scaled alike first."""
-    size = np.diagonal(total, axis1=-2, axis2=-1)
-    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    scale = column_sizes(np.diagonal(total, axis1=-2, axis2=-1))
     squares = scale[..., :, None] * scale[..., None, :]
     found: Array = np.linalg.pinv(total / squares, hermitian=True, rcond=1e-13) / squares
     return found

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.pool import Index
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -89,8 +90,7 @@ def _held(own: Array, turn: Array, another: Array) -> Array:
 
 def _apart(own: Array, left: Array) -> Apart:
     """own, left (G, p, p): information of effects alone, and with those shown freed."""
-    size = np.einsum("gaa->ga", own)
-    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    scale = column_sizes(np.einsum("gaa->ga", own))
     squares = scale[:, :, None] * scale[:, None, :]
     values, vectors = np.linalg.eigh(own / squares)
     seen = values > NO_INFORMATION

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.packing import PackingError, lower, packed, unpacked, whole
 from syncline_design.diagnosis.result import Check
 from syncline_design.diagnosis.sufficient import Less, Sufficient, TermLabel
@@ -110,7 +111,7 @@ def _is_information(normal: Array) -> bool:
     size = np.diag(normal)
     if np.any(size < 0.0):
         return False
-    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    scale = column_sizes(size)
     scaled = normal / scale[:, None] / scale
     return not size.size or bool(np.linalg.eigvalsh(scaled)[0] > -ROUNDED)
 

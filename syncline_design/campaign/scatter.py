@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.pool import Index, inverted
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -133,8 +134,7 @@ def _fitted(total: Array, score: Array) -> Array:
 
     What no run and no prior tells of, as of a vehicle at rest, adds the same to all of them.
     """
-    known = np.diagonal(total[0])
-    size = np.sqrt(np.where(known > 0.0, known, 1.0))
+    size = column_sizes(np.diagonal(total[0]))
     scaled = 0.5 * (total + np.swapaxes(total, -1, -2)) / (size[:, None] * size)
     scaled += ROUNDED * np.eye(size.size)  # effects that are one but for rounding
     root = np.linalg.cholesky(scaled)

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.random import PCG64
 
+from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.pool import Pool, Term, inverted
 from syncline_design.effects.record import Array
 from syncline_design.machine.random_numbers import generator
@@ -36,7 +37,7 @@ def tries_of(pool: Pool, terms: Sequence[Term], rate: float) -> float:
 
 def _root(normal: Array) -> Array:
     """Its symmetric root, which no choice of eigenvectors changes."""
-    size = np.sqrt(np.where(np.diag(normal) > 0.0, np.diag(normal), 1.0))
+    size = column_sizes(np.diag(normal))
     values, vectors = np.linalg.eigh(normal / size[:, None] / size)
     found: Array = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T * size
     return found
