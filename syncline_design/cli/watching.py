@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,10 @@ from syncline_design.cli.shared import (
     watched,
 )
 from syncline_design.machine.arguments import FALSE_ALARM_RATES
+
+if TYPE_CHECKING:
+    from syncline_design.campaign.watch_result import Watch
+    from syncline_design.machine.deadline import Deadline
 
 
 @guarded
@@ -95,6 +99,23 @@ def watch(
     if spec is None:
         refuse("syncline-design: watch: expected STORE SPEC [FILE], found no SPEC; a new baseline "
                "takes `watch STORE --accept`")  # fmt: skip
+    found = _look(store, spec, tuple(file or ()), output, false_alarm_rate, deadline, seed=seed,
+                  quiet=quiet)  # fmt: skip
+    return found.demanded_exit_code(informative=require_informative)
+
+
+def _look(
+    store: Path,
+    spec: Path,
+    files: tuple[Path, ...],
+    output: list[str] | None,
+    false_alarm_rate: float,
+    deadline: Deadline,
+    *,
+    seed: int,
+    quiet: bool,
+) -> Watch:
+    """The run added, all looked at, and said."""
     from syncline_design.campaign.watching import WatchRequest
     from syncline_design.campaign.watching import watch as watch_runs
     from syncline_design.diagnosis.settings import DiagnosisSettings
@@ -103,7 +124,6 @@ def watch(
     from syncline_design.spec.load import load
     from syncline_design.verdict.pinned import as_measured
 
-    files = tuple(file or ())
     targets = output_targets(output, pictured(WATCH_FORMATS), [store, spec, *files])
     with watched(deadline, targets, quiet=quiet):
         request = WatchRequest(store, files, false_alarm_rate)
@@ -111,7 +131,7 @@ def watch(
         found = watch_runs(case, request, DiagnosisSettings(seed=seed))
     emit(console(on_watch(found)), targets, lambda name: render_watch(name, found), quiet=quiet,
          charts=lambda: {"": on_watch(found)})  # fmt: skip
-    return found.demanded_exit_code(informative=require_informative)
+    return found
 
 
 def _leave_out(
