@@ -11,11 +11,11 @@ import numpy as np
 from syncline_design.campaign.changes import Change, Changes
 from syncline_design.campaign.store import Entry
 from syncline_design.campaign.strangers import share_of
+from syncline_design.diagnosis.finding import texts_of
 from syncline_design.diagnosis.result import UnlikeOthers
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.figure_text import (
     format_chance,
-    format_components,
     format_estimate,
     to_digits,
 )
@@ -87,15 +87,10 @@ def _unlike(unlike: Sequence[UnlikeOthers], ends: tuple[int, int]) -> Iterator[s
 
 def departure_words(one: UnlikeOthers) -> str:
     """`latency (position) by 7.4 ± 0.6 ms (chance by noise alone 1e-12)`."""
-    seen = {
-        name: (own.value, own.standard_uncertainty, own.unit)
-        for name, own in one.differs.items()
-        if own.seen and not isinstance(own.value, str)
-    }
-    texts = {name: own.text for name, own in one.differs.items()} | format_components(seen)
+    texts = texts_of(one.differs)
     alone = len(one.differs) == 1
     parts = [("" if alone else f"{split_suffix(name)[0].replace('_', ' ')} ") + f"by {texts[name]}"
-             for name in seen]  # fmt: skip
+             for name, own in one.differs.items() if own.seen]  # fmt: skip
     return (
         f"{one.effect.replace('_', ' ')} ({one.sensor}){' ' if alone else ', '}"
         f"{sentence_list(parts)} (chance by noise alone {format_chance(one.log10_chance)})"

@@ -53,8 +53,8 @@ def estimate(
     return Estimate(value, spread, unit, seen, text, interval95)
 
 
-def _shown(parameters: Mapping[str, Estimate]) -> dict[str, str]:
-    """Texts for a sentence: the components of one vector in one unit."""
+def texts_of(parameters: Mapping[str, Estimate]) -> dict[str, str]:
+    """Parameters as sentences tell them: the components of one vector in one unit."""
     seen = {
         name: (one.value, one.standard_uncertainty, one.unit)
         for name, one in parameters.items()
@@ -65,7 +65,7 @@ def _shown(parameters: Mapping[str, Estimate]) -> dict[str, str]:
 
 def in_words(effect: Effect, sensor: str, parameters: Mapping[str, Estimate]) -> str:
     """An effect in one sentence, without its capital."""
-    return effect.in_words(WORDS[sensor], _shown(parameters))
+    return effect.in_words(WORDS[sensor], texts_of(parameters))
 
 
 def finding(
