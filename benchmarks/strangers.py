@@ -3,18 +3,21 @@
     python -m benchmarks.strangers false [--series 200] [--looks 100] [--off S] [--scatter S]
     python -m benchmarks.strangers named [--series 60] [--runs 12]
     python -m benchmarks.strangers later [--series 60]
+    python -m benchmarks.strangers dated [--series 200] [--off 1.5]
 
 Statistics of runs are drawn as `benchmarks.campaign series` draws them, from the logs that its
 `logs` keeps.  `false`: alike runs, at every look; also whether a look without the runs that were
 said to be unlike rings.  `named`: one run, drawn, of which one effect or all of them are others, at
 the look after the last.  `later`: a run whose effects are all others among the first ten, and a
-change of five bounds from the 11th on; how late it is heard.
+change of five bounds from the 11th on; how late it is heard.  `dated`: one effect is another from
+the 8th of 12 runs on; which run is said to be the first, and between which, on that day and later.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -33,11 +36,17 @@ from benchmarks.campaign import (
     share,
 )
 from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.pool import Pool, pool_of
-from syncline_design.campaign.strangers import part_of, standing_alone, strangers
+from syncline_design.campaign.standing import standing
+from syncline_design.campaign.store import Entry, Stored
+from syncline_design.campaign.strangers import part_of, strangers
 from syncline_design.diagnosis.sufficient import Sufficient
+from tests.watched_series import run_of
 
 ONE = (5.0, 8.0, 12.0)  # bounds of a run by which one effect is another
+SIZES = (5.0, 8.0, 20.0, 60.0)  # bounds of a run by which one effect changes
+CHANGED, DATED = 8, (8, 9, 10, 12)  # the run that has it first, and looks at it
 ALL = (1.5, 3.0, 6.0)  # standard deviation of all parameters, in bounds of a run
 
 
@@ -64,9 +73,8 @@ def first(changes: Changes, look: int) -> Changes:
 
 def rings_without(changes: Changes) -> tuple[list[int], bool]:
     """Places that are said to be unlike, and whether the others ring then."""
-    found = strangers(changes)
-    odd = [one.run for one in found]
-    alone = standing_alone(found, changes.pool.count)
+    found = standing(changes, strangers(changes))
+    odd, alone = [one.run for one in found.strange], found.alone
     rest = np.delete(np.arange(changes.pool.count), alone)
     return odd, bool(alone) and _rings(part_of(changes, rest), len(rest))
 
@@ -97,7 +105,8 @@ def named(asked: argparse.Namespace, vehicles: list[list[Sufficient]]) -> None:
                 one[term.index] = size / BOUNDS * _values(pool, term, rng)
                 place = [pool.labels.index(label) for label in picks[0].labels]
                 values[odd] += _off(picks, rng, size) if every else one[place]
-                found = strangers(Changes(run_pool(picks, values, rng, asked)))
+                changes = Changes(run_pool(picks, values, rng, asked))
+                found = standing(changes, strangers(changes)).strange
                 own = [d.term.label for s in found if s.run == odd for d in s.departures]
                 right += bool(own)
                 others += any(s.run != odd for s in found)
@@ -140,9 +149,53 @@ def _heard(changes: Changes, apart: bool) -> int:
     return changes.pool.count - 9
 
 
+def dated(asked: argparse.Namespace, vehicles: list[list[Sufficient]]) -> None:
+    """Of series that ring at a look, how many are dated rightly, and how wide the intervals are."""
+    for size in SIZES:
+        told: dict[int, list[tuple[int, int, int, bool]]] = {look: [] for look in DATED}
+        for k in range(asked.series):
+            picks, values, rng = alike(asked, k, max(DATED), vehicles[k % len(vehicles)])
+            pool = pool_of(picks, range(len(picks)))
+            term = pool.terms[int(rng.integers(len(pool.terms)))]
+            moved = np.zeros(len(pool.labels))
+            moved[term.index] = size / BOUNDS * _values(pool, term, rng)
+            place = [pool.labels.index(label) for label in picks[0].labels]
+            values = values + np.zeros((len(picks), 1))
+            values[CHANGED - 1 :] += moved[place]
+            lasts = _lasting(rng, len(picks), asked)
+            runs = [drawn(s, rng, *own) for s, *own in zip(picks, values, lasts, strict=True)]
+            for look in DATED:
+                told[look] += _since(runs[:look])
+        for look, every in told.items():
+            right = sum(k == CHANGED for _, k, _, _ in every)
+            held = sum(low <= CHANGED <= high for low, _, high, _ in every)
+            width = np.mean([high - low + 1 for low, _, high, _ in every] or [0])
+            odd = sum(alone for *_, alone in every)
+            print(f"change of {size:g} bounds with run {CHANGED}, after run {look}: "
+                  f"{len(every)} of {asked.series} ring; its run is said in "
+                  f"{share(right, len(every))}, the interval holds it in "
+                  f"{share(held, len(every))} ({width:.2f} runs wide), another run is said to "
+                  f"stand alone in {share(odd, len(every))}", flush=True)  # fmt: skip
+
+
+def _since(found: list[Sufficient]) -> list[tuple[int, int, int, bool]]:
+    """Of runs that ring: numbers of the first run that is said to have the change and of those
+    between which it is, and whether a run is said to stand alone."""
+    entries = tuple(
+        Entry(k + 1, f"#{k + 1}", run_of(one, k), one, f"{k:064d}") for k, one in enumerate(found)
+    )
+    changes = Changes(pool_of(found, range(len(found))))
+    alone = standing(changes, strangers(changes)).alone
+    runs = tuple(entry for k, entry in enumerate(entries) if k not in alone)
+    stored = Stored(Path("store"), "car", {}, entries, (), {}, (), 0, "", b"")
+    seen = ComparedRuns(stored, runs, float(np.log(20.0))).seen
+    ends = [(one.low, one.change.k, one.high) for one in seen[:1]]
+    return [(*(runs[k].number for k in own), bool(alone)) for own in ends]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["false", "named", "later"])
+    parser.add_argument("what", choices=["false", "named", "later", "dated"])
     parser.add_argument("--series", type=int, default=60)
     parser.add_argument("--looks", type=int, default=100)
     parser.add_argument("--runs", type=int, default=12)
@@ -150,7 +203,8 @@ def main() -> None:
     parser.add_argument("--scatter", type=float, default=0.0)
     asked = parser.parse_args()
     vehicles = list(logs_of("georeference", is_foreign=False).values())
-    {"false": false, "named": named, "later": later}[asked.what](asked, vehicles)
+    told = {"false": false, "named": named, "later": later, "dated": dated}
+    told[asked.what](asked, vehicles)
 
 
 if __name__ == "__main__":

@@ -16,8 +16,9 @@ from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.pool import pool_of
+from syncline_design.campaign.standing import standing
 from syncline_design.campaign.store import Entry, Stored, add_run
-from syncline_design.campaign.strangers import standing_alone, strangers
+from syncline_design.campaign.strangers import strangers
 from syncline_design.diagnosis.result import Check
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.system import pinned_system
@@ -130,8 +131,24 @@ def test_what_lasts_or_differs_in_every_run_makes_no_stranger() -> None:
         (20.0 * (np.arange(12) == 11), ()),
     ):
         runs = [statistics(rng, np.array([size, 0, 0, 0, 0]) * BOUND) for size in sizes]
-        found = strangers(Changes(pool_of(runs, range(12))))
-        assert standing_alone(found, 12) == alone
+        changes = Changes(pool_of(runs, range(12)))
+        assert standing(changes, strangers(changes)).alone == alone
+
+
+@pytest.mark.parametrize("size", [8.0, 20.0, 60.0])
+def test_runs_of_a_change_that_show_it_by_other_names_are_no_strangers(size: float) -> None:
+    """Columns of cosine 0.97, moved with the 8th run: one run shows a latency, the next a datum.
+    The change is dated by all of its runs, and none of them, nor any before, stands alone."""
+    for seed in range(15):
+        rng = np.random.default_rng([18, seed])
+        base = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+        moved = np.array([size, 0, 0, 0, 0]) * BOUND
+        runs = [statistics(rng, base + moved * (k >= 7), 0.97) for k in range(12)]
+        for look in (9, 10, 12):
+            changes = Changes(pool_of(runs[:look], range(look)))
+            found = standing(changes, strangers(changes))
+            assert found.alone == ()
+            assert not found.strange
 
 
 def test_several_changes_of_one_day_are_told_once_each_with_their_uncertainty(

@@ -41,7 +41,6 @@ PAIRED: Final = 3  # of them, of which two are looked at together
 FEWEST_OF_PAIRS: Final = 6  # runs
 SCATTER_KNOWN: Final = 8  # runs; before, an effect is taken to differ by APART from run to run
 AS_GOOD_NATS: Final = 2.0
-ALIKE_SPREADS: Final = 5.0  # standard uncertainties within which two strange runs are alike
 
 
 def share_of(look: int) -> float:
@@ -65,24 +64,11 @@ class Stranger:
     run: int
     departures: tuple[Departure, ...]
 
-    def is_like(self, other: Stranger) -> bool:
-        """Whether both differ from the rest by as much in what is clearest of either."""
-        return self._shares(other) or other._shares(self)
-
-    def _shares(self, other: Stranger) -> bool:
-        first = self.departures[0]
-        same = [d for d in other.departures if d.term.label == first.term.label]
-        if not same:
-            return False
-        off = np.abs(first.judged.values - same[0].judged.values)
-        spread = np.hypot(first.judged.spread, same[0].judged.spread)
-        return bool(np.all(off <= ALIKE_SPREADS * spread))
-
 
 def strangers(changes: Changes) -> tuple[Stranger, ...]:
     """All runs that are unlike the others, by their places; none where half of them would be."""
     rows = np.arange(changes.pool.count)
-    limit = math.log(RATE * share_of(max(changes.pool.count, 2)))
+    limit = limit_of(changes)
     found: list[Stranger] = []
     while len(rows) >= FEWEST:
         one = _strangest(part_of(changes, rows), limit)
@@ -100,19 +86,18 @@ def _anew(changes: Changes, one: Stranger, odd: Sequence[int], limit: float) -> 
     """A strange run with all its departures, none of which another strange one hides."""
     rows = np.array([k for k in range(changes.pool.count) if k == one.run or k not in odd])
     at = int(np.flatnonzero(rows == one.run)[0])
-    found = tuple(_held(part_of(changes, rows), at, ()).departures(limit))
+    found = departures_of(part_of(changes, rows), at, limit)
     return replace(one, departures=found or one.departures)
 
 
-def standing_alone(strange: Sequence[Stranger], count: int) -> tuple[int, ...]:
-    """Places, of `count` runs, of those that none beside them is like: what began with a run and
-    lasts, or was over with the second one, is a change."""
-    known = {one.run: one for one in strange}
-    return tuple(
-        k for k, one in known.items()
-        if 0 < k < count - 1
-        and not any(one.is_like(known[b]) for b in (k - 1, k + 1) if b in known)
-    )  # fmt: skip
+def limit_of(changes: Changes) -> float:
+    """log of the chance below which one of these runs is unlike the others."""
+    return math.log(RATE * share_of(max(changes.pool.count, 2)))
+
+
+def departures_of(changes: Changes, run: int, limit: float) -> tuple[Departure, ...]:
+    """All in which a run, by its place, is unlike all the others of these."""
+    return tuple(_held(changes, run, ()).departures(limit))
 
 
 def part_of(changes: Changes, rows: Index) -> Changes:

@@ -20,6 +20,7 @@ from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.oddities import cautions
 from syncline_design.campaign.run_values import RunParameter, run_values
 from syncline_design.campaign.sight import sight
+from syncline_design.campaign.standing import StandingAlone, standing
 from syncline_design.campaign.store import (
     Entry,
     Stored,
@@ -35,7 +36,7 @@ from syncline_design.campaign.store import (
     refused,
 )
 from syncline_design.campaign.strangers import RATE as STRANGER_RATE
-from syncline_design.campaign.strangers import Stranger, standing_alone, strangers
+from syncline_design.campaign.strangers import Stranger, strangers
 from syncline_design.campaign.telling import estimates
 from syncline_design.campaign.watch_result import (
     Alarm,
@@ -178,14 +179,20 @@ class Watching:
         return ComparedRuns(self.stored, self.ordered, -math.log(self.request.rate))
 
     @cached_property
-    def strange(self) -> tuple[Stranger, ...]:
-        """Runs that are unlike all the others, by their places."""
-        return strangers(self.every.changes) if self.ordered else ()
+    def standing(self) -> StandingAlone:
+        """Runs that are unlike all the others, and which of them stand alone."""
+        found = strangers(self.every.changes) if self.ordered else ()
+        return standing(self.every.changes, found)
 
-    @cached_property
+    @property
+    def strange(self) -> tuple[Stranger, ...]:
+        """Runs that are unlike all the others and not by a change of several, by their places."""
+        return self.standing.strange
+
+    @property
     def alone(self) -> tuple[int, ...]:
         """Places of those among them that stand alone between runs that are alike."""
-        return standing_alone(self.strange, len(self.ordered))
+        return self.standing.alone
 
     @cached_property
     def rest(self) -> ComparedRuns:
@@ -258,14 +265,13 @@ class Watching:
                 )  # fmt: skip
 
     def _is_explained(self, stranger: Stranger) -> bool:
-        """Whether a change that is told says it: one of several runs alike, or of one effect."""
-        if not self.rest.seen or stranger.run in self.alone:
+        """Whether a change that is told says it: of one effect, by its name or by its day."""
+        if not self.rest.seen or stranger.run in self.alone or len(stranger.departures) > 1:
             return False
-        beside = (one for one in self.strange if abs(one.run - stranger.run) == 1)
-        if any(stranger.is_like(one) for one in beside):
-            return True
         told = {one.change.term.label for one in self.rest.seen}
-        return len(stranger.departures) == 1 and stranger.departures[0].term.label in told
+        begun = {self.rest.runs[one.change.k].number for one in self.rest.seen}
+        own = stranger.departures[0].term.label
+        return own in told or self.ordered[stranger.run].number in begun
 
     def _alone_alarms(self) -> Iterator[Alarm]:
         """Where what rang is of single runs, which the others before and after do not have."""
