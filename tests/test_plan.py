@@ -229,11 +229,13 @@ def test_kml_holds_the_path_where_it_is_on_the_globe(run: PlanRun) -> None:
     space = {"k": "http://www.opengis.net/kml/2.2"}
     assert root.tag == "{http://www.opengis.net/kml/2.2}kml"
     lines = root.findall("k:Document/k:Placemark/k:LineString", space)
-    assert len(lines) == len(run.result.legs)
+    logged = len(run.result.legs)
+    before, after = run.approach.run_up_m, run.approach.run_out_m
+    assert len(lines) == logged + (before is not None) + (after is not None)
     modes = {m.text for m in root.iter("{http://www.opengis.net/kml/2.2}altitudeMode")}
     assert modes == {"absolute"}
     path = run.path.position_m
-    for line in lines:
+    for line in lines[:logged]:
         text = line.findtext("k:coordinates", namespaces=space)
         assert text
         for part in text.split():
@@ -264,6 +266,8 @@ def test_the_mission_is_a_plan_file_of_qgroundcontrol(run: PlanRun) -> None:
             lat, lon, height = item["params"][4:]
             places.append(pymap3d.geodetic2ned(lat, lon, ORIGIN[2] + height, *ORIGIN))
     path = run.path.position_m
+    places = places[run.approach.run_up_m is not None :]
+    places = places[: -1 if run.approach.run_out_m is not None else None]
     for place in places:
         assert np.min(np.linalg.norm(path - np.array(place), axis=1)) < 0.05
     legs = np.array(places)  # straight lines between the items stay near the path

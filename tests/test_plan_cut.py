@@ -112,9 +112,9 @@ def _is_number(word: str) -> bool:
     return word.replace(".", "", 1).isdigit()
 
 
-def asked(folder: Path, wanted: PlanWanted, minutes: float = 10.0) -> PlanRun:
+def asked(folder: Path, wanted: PlanWanted, minutes: float = 10.0, text: str = TRACTOR) -> PlanRun:
     path = folder / "tractor.yaml"
-    path.write_text(TRACTOR, encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     return planned(load(path), PlanRequest(wanted, minutes=minutes, line_plans=False))
 
 
@@ -190,3 +190,23 @@ def test_what_begins_fast_says_its_run_up(tmp_path: Path) -> None:
     begins = float(leg.words.split(" in all: at ")[1].split(" m/s")[0])
     run_up = float(leg.words.split("; before it a run-up of ")[1].split(" m ")[0])
     assert run_up == pytest.approx(begins**2 / 0.96, rel=0.06)
+
+
+def test_an_area_holds_the_run_up_and_the_run_out(tmp_path: Path) -> None:
+    """Nine tenths of an area 25 m wide hold them too, where the drive alone takes less."""
+    wanted = PlanWanted((), separate_of("latency(position)=44.3 ms", RIVALS))
+    (tmp_path / "free").mkdir()
+    free = asked(tmp_path / "free", wanted)
+    small_m = 0.99 * float(np.max(taken_m(free)))
+    area = f"area: [{small_m} m, {small_m} m], distance:"
+    run = asked(tmp_path, wanted, text=TRACTOR.replace("distance:", area))
+    assert run.result.reached
+    assert np.all(taken_m(run) <= 0.9 * small_m + 1e-6)
+
+
+def taken_m(run: PlanRun) -> Array:
+    """North and east extent of a drive, 1.5 v^2 / 0.8 / 1.8 m before and after with it."""
+    place, way = run.path.position_m[:, :2], np.diff(run.path.position_m[:, :2], axis=0)
+    step_s = float(run.path.time_s[1] - run.path.time_s[0])
+    before, after = (np.linalg.norm(one) * one / step_s**2 / 0.96 for one in (way[0], way[-1]))
+    return np.ptp(np.vstack([place[0] - before, place, place[-1] + after]), axis=0)

@@ -9,6 +9,7 @@ import json
 import math
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import jsonschema
@@ -110,7 +111,7 @@ def test_missions_of_other_vehicles_fit_the_format_and_the_vehicle(other: PlanRu
     jsonschema.validate(plan, MISSION)
     mission, motion = plan["mission"], other.motion
     assert mission["vehicleType"] == MAV_TYPES[motion]
-    items = mission["items"]
+    items = logged(other)
     assert [i["command"] == 22 for i in items] == [
         motion == "fixed_wing",
         *[False] * len(items[1:]),
@@ -145,13 +146,51 @@ def test_missions_of_other_vehicles_fit_the_format_and_the_vehicle(other: PlanRu
     assert driven_s == pytest.approx(path.time_s[-1] - path.time_s[0], rel=0.05)
 
 
+USUAL = {"fixed_wing": (4.0, 0.6), "surface": (0.3, 0.0), "underwater": (0.15, 0.3)}  # docs/plan.md
+
+
+def test_missions_hold_the_run_up_and_the_run_out(other: PlanRun) -> None:
+    """(v^2 - v0^2) / (1.2 a) straight on before and after, at most half of v_max a second: without
+    them an autopilot gains its speed after the begin and brakes before the end."""
+    acceleration, slowest = USUAL[other.motion]
+    most = {"fixed_wing": 25.0, "surface": 5.0, "underwater": 2.0}[other.motion]
+    path, items = other.path, json.loads(render_plan("qgc", other))["mission"]["items"]
+    places = [
+        np.array(pymap3d.geodetic2ned(lat, lon, ORIGIN[2] + height, *ORIGIN))[:2]
+        for *_, lat, lon, height in (i["params"] for i in items if i["command"] == 16)
+    ]
+    way = path.position_m[:, :2]
+    ends = ((places[0], way[0], way[1], 1), (places[-1], way[-1], way[-2], -2))
+    for place, end, inside, k in ends:
+        step_s = abs(path.time_s[k] - path.time_s[k + 1 if k < 0 else 0])
+        speed = float(np.linalg.norm(inside - end)) / step_s
+        long_m = (speed**2 - (slowest * most) ** 2) / (1.2 * min(acceleration, 0.5 * most))
+        away = place - end
+        assert float(np.linalg.norm(away)) == pytest.approx(max(long_m, 0.0), rel=0.05, abs=0.1)
+        if long_m > 0.5:
+            ahead = (end - inside) / float(np.linalg.norm(end - inside))
+            assert float(away @ ahead) == pytest.approx(float(np.linalg.norm(away)), rel=0.02)
+    first = next(i["params"][1] for i in items if i["command"] == 178)
+    begun = float(np.linalg.norm(way[1] - way[0])) / float(path.time_s[1] - path.time_s[0])
+    assert first == pytest.approx(begun, rel=0.1, abs=0.05)
+
+
+def logged(run: PlanRun) -> list[dict[str, Any]]:
+    """The items of a mission without the run-up and the run-out."""
+    items = json.loads(render_plan("qgc", run))["mission"]["items"]
+    places = [k for k, item in enumerate(items) if item["command"] == 16]
+    beside = (run.approach.run_up_m, places[0]), (run.approach.run_out_m, places[-1])
+    dropped = [k for place, k in beside if place is not None]
+    return [item for k, item in enumerate(items) if k not in dropped]
+
+
 def course(run: PlanRun) -> list[tuple[float, dict[str, float], int]]:
     """What an autopilot makes of a mission: when it is at each place, the heading and the way round
     that it was told, and whether it was told to reverse, in the order of ArduPilot (commands before
     a place count on the way there)."""
     now, speed, before = float(run.path.time_s[0]), math.nan, None
     told, astern, found = {}, 0, []
-    for item in json.loads(render_plan("qgc", run))["mission"]["items"]:
+    for item in logged(run):
         first, second, third = item["params"][:3]
         match item["command"]:
             case 178:
@@ -254,4 +293,6 @@ def test_a_chain_is_planned_and_written(tmp_path: Path) -> None:
     ]
     root = ElementTree.fromstring(render_plan("kml", found))
     lines = root.iter("{http://www.opengis.net/kml/2.2}LineString")
-    assert len(list(lines)) == len(found.result.legs)
+    beside = (found.approach.run_up_m, found.approach.run_out_m)
+    more = sum(place is not None for place in beside)
+    assert len(list(lines)) == len(found.result.legs) + more

@@ -7,7 +7,7 @@ noise, and the best of them is named.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field, replace
 
 import numpy as np
@@ -73,14 +73,20 @@ class Comparison:
 
 
 def competed(
-    data: Data, model: Model, label: Label, others: Sequence[Signature], again: int = 2
+    data: Data,
+    model: Model,
+    label: Label,
+    others: Sequence[Signature],
+    fallen: Collection[Label] = (),
+    again: int = 2,
 ) -> tuple[Model, Comparison]:
     """The model with the best effect in a named one's place, and the rest against that one.
 
     Its class competes, and whatever fits as well to first order: with the other effects of the
     model fitted again, an effect of quite another signature may be the better one by far.  So may
-    what always acts where a step is named: the noise has taken up what the step leaves of it.  The
-    model has to be fitted.
+    what always acts where a step is named: the noise has taken up what the step leaves of it.  What
+    fell (noise of another kind shows as much of it) is compared, and never named.  The model has to
+    be fitted.
     """
     span = span_of(effect_of(model, label))
     if span is not None:  # rivals act in the same part of the log
@@ -100,9 +106,10 @@ def competed(
     }
     charges = {one: charge(data, fitted, one, model) for one, fitted in fits.items()}
     charges[label] = charge(data, model, label, model)
-    best = _best(data, model, label, fits, charges)
+    able = {rival: one for rival, one in fits.items() if rival not in fallen}
+    best = _best(data, model, label, able, charges)
     if best != label and again:
-        return competed(data, fits[best], best, others, again - 1)
+        return competed(data, fits[best], best, others, fallen, again - 1)
     return model, _sorted_out(data, model, label, screened, fits, charges)
 
 

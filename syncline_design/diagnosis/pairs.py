@@ -1,8 +1,10 @@
-"""Two effects that nearly undo each other: neither shows alone, both together do.
+"""Two effects together: that nearly undo each other, or that look like a third one.
 
-A delay and an arm that cancel but for the turns of a drive leave little for each of them alone.  To
+A delay and an arm that cancel but for the turns of a drive leave little for each of them alone.  A
+delay and a range bias of a short drive are nearly an arm, which alone gains more than either.  To
 first order two signatures together save g' M^-1 g / 2, g and M the score and the normal matrix of
-both; what saves most is fitted, and pays for its freedom and for all pairs that were looked at.
+both; what saves most is fitted, and pays for its freedom and for all pairs that were looked at: of
+two in the place of one, each figure more costs half of log N (Schwarz 1978), as in `charges`.
 """
 
 from __future__ import annotations
@@ -16,12 +18,15 @@ import numpy as np
 
 from syncline_design.diagnosis.candidates import Signature, zero_values
 from syncline_design.diagnosis.fitting import Data, Model, fit, solve_scaled
+from syncline_design.diagnosis.identity import Label
 from syncline_design.diagnosis.noise import NoiseLevel
 from syncline_design.diagnosis.scores import Gram, log_p_of, possible
 from syncline_design.diagnosis.slow_states import States
 from syncline_design.machine.quick_dataclass import dataclass
 
 TRIED: Final = 2  # pairs that are fitted
+SLACK_NATS, SLACK_SHARE = 6.0, 0.05  # by which first order may be too hard on a pair
+CLEAR_NATS: Final = 4.5  # by which two have to be better than one beyond what their figures cost
 SignaturePair = tuple[Signature, Signature]
 
 
@@ -41,8 +46,7 @@ def promising(
 
     scores: under several noise levels, of the signatures `free`; a pair counts by its best one.
     """
-    asked = [k for k, s in enumerate(free) if s.plain and s.candidate.effect.asked_jointly]
-    pairs = list(combinations(asked, 2))
+    pairs = _pairs(free)
     best: dict[tuple[int, int], Promising] = {}
     for level, gram in scores:
         for one in pairs:
@@ -53,6 +57,42 @@ def promising(
             if log_p < limit and (one not in best or log_p < best[one].log_p):
                 best[one] = Promising((free[one[0]], free[one[1]]), level, log_p)
     return sorted(best.values(), key=lambda each: each.log_p)
+
+
+def in_the_place(
+    scores: Sequence[tuple[NoiseLevel, Gram]], free: Sequence[Signature], label: Label
+) -> list[Promising]:
+    """Pairs that save about as much as the one effect of a label, or more; the best first.
+
+    scores: of all in `free`, that effect among them, where it is taken out of the model.
+    """
+    alone = [k for k, s in enumerate(free) if s.candidate.label == label]
+    pairs = [one for one in _pairs(free) if all(free[k].candidate.label != label for k in one)]
+    best: dict[tuple[int, int], tuple[float, NoiseLevel]] = {}
+    for level, gram in scores:
+        gains = gram.gains()
+        own = max(gains[k][0] for k in alone)
+        least = own - max(SLACK_NATS, SLACK_SHARE * own)
+        for one in pairs:
+            found = _joint(gram, free, one)
+            if found is not None and found > least and found - own > best.get(one, (-math.inf,))[0]:
+                best[one] = found - own, level
+    ranked = sorted(best.items(), key=lambda entry: (-entry[1][0], entry[0]))
+    return [Promising((free[one[0]], free[one[1]]), level, -more) for one, (more, level) in ranked]
+
+
+def clearly_two(data: Data, two: Model, one: Model, free: Sequence[Signature]) -> bool:
+    """Whether two effects in the place of one fit better by more than their figures and luck."""
+    figures = len(two.covariance) - len(one.covariance)
+    each = 0.5 * math.log(max(len(data.view) * len(data.axes), 2))
+    paid = figures * each + math.log(max(len(_pairs(free)), 1))
+    return one.nll - two.nll > CLEAR_NATS + paid
+
+
+def _pairs(free: Sequence[Signature]) -> list[tuple[int, int]]:
+    """Of what is asked jointly, whatever two."""
+    asked = [k for k, s in enumerate(free) if s.plain and s.candidate.effect.asked_jointly]
+    return list(combinations(asked, 2))
 
 
 def _freedom(free: Sequence[Signature], one: tuple[int, int]) -> int:

@@ -9,7 +9,7 @@ wanders takes the shape of whatever is missing.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -81,7 +81,8 @@ class Trial:
 class Proposals:
     """What can be added to a model of one log.
 
-    signatures: of the candidates that move the mean; states: of slow noise in this log.
+    signatures: of the candidates that move the mean; states: of slow noise in this log; fallen:
+    what was found and did not stand, and is not proposed again.
     """
 
     data: Data
@@ -90,6 +91,11 @@ class Proposals:
     candidates: tuple[Candidate, ...]
     signatures: tuple[Signature, ...]
     states: States
+    fallen: frozenset[Label] = frozenset()
+
+    def less(self, fallen: Collection[Label]) -> Proposals:
+        """The same without effects that were tried and did not stand."""
+        return replace(self, fallen=self.fallen | frozenset(fallen))
 
     def with_data(self, data: Data) -> Proposals:
         """The same in the noise of other data on the same log."""
@@ -101,7 +107,8 @@ class Proposals:
 
     def free_signatures(self, model: Model) -> list[Signature]:
         """Signatures of what the model does not hold yet."""
-        return [s for s in self.signatures if s.candidate.label not in model.labels]
+        known = self.fallen.union(model.labels)
+        return [s for s in self.signatures if s.candidate.label not in known]
 
     def threshold_at(self, model: Model) -> float:
         """log p that the best of what a model does not hold falls below in a clean log."""
@@ -147,14 +154,12 @@ class Proposals:
         wanted = beyond_chance(self.free_signatures(model), scores, threshold)[:TRIED]
         trials = [self.trial(model, s, model.level) for s in wanted]
         kept = [t for t in trials if t.log_p <= threshold and plausible(self.data, t.model)]
-        return preferred([t for t in kept if self.stands_fitted(t)])
+        return preferred([t for t in kept if self.stand_all(t.model, [t.candidate.label])])
 
-    def stands_fitted(self, trial: Trial) -> bool:
-        """Whether the effect of a trial stands beside slow courses that are sized with it."""
-        judged = weaker_judged(self.data, trial.model, self.states)
-        return all(
-            self.stands(one, a.effect) for a, one in judged if a.label == trial.candidate.label
-        )
+    def stand_all(self, model: Model, labels: Collection[Label]) -> bool:
+        """Whether effects of a model stand beside slow courses that are sized with them."""
+        judged = weaker_judged(self.data, model, self.states)
+        return all(self.stands(one, a.effect) for a, one in judged if a.label in labels)
 
     def not_for_good(self, model: Model, found: Trial) -> Trial:
         """A trial, or what goes back after a while in the place of a step that does not.

@@ -20,6 +20,9 @@ from syncline_design.diagnosis.candidates import (
 )
 from syncline_design.diagnosis.episodes import Episode, episode_effect, episodes, with_episodes
 from syncline_design.diagnosis.fitting import Data, Model, finely, fit
+from syncline_design.diagnosis.identity import without
+from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
+from syncline_design.diagnosis.pairs import clearly_two, in_the_place, with_pair
 from syncline_design.diagnosis.parts import cut_down
 from syncline_design.diagnosis.proposals import Label, Proposals
 from syncline_design.diagnosis.settings import DiagnosisSettings
@@ -41,6 +44,7 @@ from syncline_design.machine.random_numbers import generator
 
 MOVED = 2.0  # standard uncertainties by which an effect has to move for its rivals to be tried
 VARIES = 0.1  # of an effect's value, by which it has to vary to be said to
+FALLEN = 2  # times that the search goes on for what may be in the place of what fell
 EPISODES = 7  # key of the draws that look for them
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
@@ -117,20 +121,43 @@ class Search:
                 continue
             trial = trial or tried.noise(model, threshold)
             if trial is None:
-                break
+                two = self.in_two(model)
+                if two is None:
+                    break
+                model = two
+                continue
             model = cut_down(self.states, self.exchanged(trial.model, model))
             in_force().doing("searching beyond " + ", ".join(name for name, *_ in model.labels))
             self.progress(len(model.labels) / self.settings.max_effects)
         return base, model
 
     def settled(self, model: Model) -> Settled:
-        """The final model: its classes decided, its evidence counted, needless effects gone."""
-        fine = finely(self.data)
-        start = fit(fine, model.acting, model.opened, start=model.level)
-        threshold = replace(self.proposals, data=fine).threshold_at
-        final = settle(fine, start, self.signatures, threshold, self.states, self.proposals.stands)
+        """The final model: its classes decided, its evidence counted, needless effects gone.
+
+        Where one went that has nothing in its place, it was not the cause, and stood in the way of
+        what may be: the search goes on without it.
+        """
+        final = self.once_settled(model)
+        for _ in range(FALLEN):
+            gone = {a.label for a in model.acting} - set(final.model.labels)
+            self.proposals = self.proposals.less(gone)
+            coarse = fit(self.data, final.model.acting, final.model.opened, start=final.model.level)
+            model = self.grown(coarse, coarse)[1] if gone else coarse
+            if set(model.labels) == set(final.model.labels):
+                break
+            final = self.once_settled(model)
         found = wanderings(final.data, final.model, VARIES, self.settings.seed)
         return replace(final, wandering=found)
+
+    def once_settled(self, model: Model) -> Settled:
+        """The same, of one model."""
+        fine = finely(self.data)
+        start = fit(fine, model.acting, model.opened, start=model.level)
+        tried = self.proposals
+        threshold = replace(tried, data=fine).threshold_at
+        return settle(
+            fine, start, self.signatures, threshold, self.states, tried.stands, tried.fallen
+        )
 
     def with_uneven_noise(self, model: Model) -> bool:
         """Look once for noise that is larger in some readings, or for a while; whether it is."""
@@ -156,19 +183,36 @@ class Search:
         for one in moved(model, before):
             k = [a.label for a in model.acting].index(one)
             rest = tuple(a for i, a in enumerate(model.acting) if i != k)
-            without = fit(self.data, rest, model.opened, start=model.level)
-            rungs = self.proposals.rungs(without, self.proposals.scores(without))
-            for s, level in self.proposals.screened(without, rungs):
+            less = fit(self.data, rest, model.opened, start=model.level)
+            rungs = self.proposals.rungs(less, self.proposals.scores(less))
+            for s, level in self.proposals.screened(less, rungs):
                 if s.candidate.label == one:
                     break  # what gains less to first order is no better
                 if s.candidate.effect.kind == "stochastic":
                     continue
-                trial = self.proposals.trial(without, s, level)
+                trial = self.proposals.trial(less, s, level)
                 model = self.at_least(model, trial.model)
                 if plausible(self.data, trial.model) and clearly_better(trial.model, model):
                     model = trial.model
                     break
         return model
+
+    def in_two(self, model: Model) -> Model | None:
+        """The model with two effects where one stood for both; None where none does."""
+        for one in model.acting:
+            rest = without(model, one.label)
+            rest = replace(rest, error=self.data.error(rest.acting))
+            free = self.proposals.free_signatures(rest)
+            rungs = self.proposals.rungs(rest, self.proposals.scores(rest))
+            for pair in in_the_place(rungs, free, one.label)[:TRIED_PAIRS]:
+                two = with_pair(self.data, rest, pair)
+                if (
+                    clearly_two(self.data, two, self.at_least(model, two), free)
+                    and plausible(self.data, two)
+                    and self.proposals.stand_all(two, [s.candidate.label for s in pair.pair])
+                ):
+                    return two
+        return None
 
     def at_least(self, model: Model, rival: Model) -> Model:
         """A model, in the noise of one that seems clearly better where that suits it better.

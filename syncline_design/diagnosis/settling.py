@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import field, replace
 
 import numpy as np
@@ -73,17 +73,19 @@ def settle(
     threshold: Callable[[Model], float],
     states: States,
     standing: Callable[[Judged, Effect], bool],
+    fallen: Collection[Label] = (),
 ) -> Settled:
     """Let every class compete, then drop the weakest effect while chance does as well.
 
     The last one that is left has to bear its own evidence like any other.
     threshold: log p that the best candidate of a clean log falls below at the stated rate, given
     the model without the effect.  standing: whether an effect stands up in noise of another kind.
+    fallen: what did not.
     """
     while True:
         model = _standing(data, model, states, standing)
         known = set(model.labels)
-        model, classes = _decided(data, model, others)
+        model, classes = _decided(data, model, others, fallen)
         if set(model.labels) != known and set(model.labels) != set(
             _standing(data, model, states, standing).labels
         ):
@@ -165,7 +167,7 @@ def weaker_judged(data: Data, model: Model, states: States) -> list[tuple[Acting
 
 
 def _decided(
-    data: Data, model: Model, others: Sequence[Signature]
+    data: Data, model: Model, others: Sequence[Signature], fallen: Collection[Label]
 ) -> tuple[Model, dict[Label, Comparison]]:
     """The model with the best of every class, and what each is compared with."""
     classes: dict[Label, Comparison] = {}
@@ -178,7 +180,7 @@ def _decided(
                 model = less
                 continue
             known = set(model.labels)
-            model, compared = competed(data, model, label, others)
+            model, compared = competed(data, model, label, others, fallen)
             own = (set(model.labels) - known) or {label}
             classes[own.pop()] = compared
         if set(model.labels) == before:

@@ -21,6 +21,7 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.planning.aims import beside
+from syncline_design.planning.approach import approach
 from syncline_design.planning.beyond import BeyondFirst
 from syncline_design.planning.information import (
     Unknown,
@@ -224,7 +225,7 @@ class World:
             now,
             once,
             twice,
-            _swept(path),
+            _swept(path) if leg.begins_mps is None else _with_approach(vehicle, leg),
             float(path.euler_rad[-1, 2]),
             turns_s,
             self._rooms[leg.stage],
@@ -259,6 +260,21 @@ def _swept(path: PathStates) -> Swept:
         (float(own.min() - own[0]), float(own.max() - own[0])) for own in path.position_m.T[:2]
     )
     north_m, east_m = (float(v) for v in path.position_m[-1, :2] - path.position_m[0, :2])
+    return Swept((north_m, east_m), (south, north, west, east))
+
+
+def _with_approach(vehicle: Vehicle, leg: Leg) -> Swept:
+    """What a leg that is a drive of its own takes, with the way straight on to it, and what it
+    takes to gain its speed and to lose it."""
+    begun = transition(vehicle, 0.0, leg.begins_mps)
+    path = travelled(vehicle, joined([begun, leg.course]))
+    beside = approach(vehicle, path)
+    ends = [place for place in (beside.run_up_m, beside.run_out_m) if place is not None]
+    places = np.vstack([path.position_m, *ends])[:, :2] - path.position_m[len(begun), :2]
+    (south, west), (north, east) = (
+        tuple(map(float, of(places, axis=0))) for of in (np.min, np.max)
+    )
+    north_m, east_m = (float(v) for v in places[len(path.time_s) - 1])
     return Swept((north_m, east_m), (south, north, west, east))
 
 

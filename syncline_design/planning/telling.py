@@ -20,6 +20,7 @@ from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
+from syncline_design.planning.approach import Approach, approach, run_up_words
 from syncline_design.planning.areas import beyond_areas, tight_areas
 from syncline_design.planning.drives import DrivenLeg, WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
@@ -52,7 +53,6 @@ from syncline_design.planning.search import (
 )
 from syncline_design.planning.setup import SECONDS, Setup
 from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
-from syncline_design.planning.vehicle import ALONG
 from syncline_design.planning.wanted import (
     PairGoal,
     PlanError,
@@ -72,7 +72,8 @@ class PlanRun(Shown):
     path: of the vehicle that drives, at most ROW_S apart; target_m: what is aimed at from a row
     on, NaN where nothing is.  leg: by row, its place among the plan's.  driven: every stage's
     motion and the targets, at the rows of the log.  motion: of the vehicle on the path.
-    others: the paths of a chain's other vehicles at the same moments, by stage.
+    others: the paths of a chain's other vehicles at the same moments, by stage.  approach: what
+    lies before and after it.
     """
 
     result: Plan
@@ -82,6 +83,7 @@ class PlanRun(Shown):
     driven: Drive
     motion: str
     others: Mapping[str, PathStates]
+    approach: Approach
 
 
 def duration_s(found: WholeDrive) -> float:
@@ -153,7 +155,9 @@ class Telling:
             for k, one in enumerate(self.setup.system.stages)
             if k != found.stretches[-1].leg.stage
         }
-        return PlanRun(result, path, target, leg, found.driven, vehicle.motion, others)
+        return PlanRun(
+            result, path, target, leg, found.driven, vehicle.motion, others, approach(vehicle, path)
+        )
 
     def _cautions(self) -> tuple[str, ...]:
         found = self.setup.request.diagnosis
@@ -270,22 +274,14 @@ class Telling:
         """What to do in a leg, from the turn on with which it begins."""
         angle = round(math.degrees(one.turn_rad))
         if angle == 0:
-            return one.leg.words + self._run_up(one)
+            vehicle = self.setup.world.vehicles[one.leg.stage]
+            return one.leg.words + run_up_words(vehicle, one.leg.begins_mps or 0.0)
         joins_mps = self.setup.world.vehicles[one.leg.stage].join_mps
         speed = joins_mps if one.leg.begins_mps is None else one.leg.begins_mps
         how = f"at {to_digits(speed, 2)} m/s" if speed else "on the spot"
         side = "right" if angle > 0 else "left"
         words = one.leg.words
         return f"Turn {side} by {abs(angle)} deg {how}, then {words[0].lower()}{words[1:]}"
-
-    def _run_up(self, one: DrivenLeg) -> str:
-        """What it takes to begin faster than the vehicle's slowest: (v^2 - v0^2) / (2 a), [m]."""
-        vehicle, begins_mps = self.setup.world.vehicles[one.leg.stage], one.leg.begins_mps or 0.0
-        if begins_mps <= vehicle.slowest_mps:
-            return ""
-        gained = begins_mps**2 - vehicle.slowest_mps**2
-        way_m = gained / (2.0 * ALONG * vehicle.acceleration_mps2)
-        return f"; before it a run-up of {to_digits(way_m, 2)} m straight on, not logged"
 
     def _meanwhile(self, stage: int) -> str:
         """What the other vehicles of a chain do."""

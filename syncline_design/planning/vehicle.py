@@ -120,6 +120,12 @@ class Vehicle:
         slope = 2.0 * across / (GRAVITY_MPS2 * math.sqrt(2.0 * math.pi))
         return max(usual, slope / (TURN_SHARE * self.omega_max_radps))
 
+    def gaining_m(self, speed_mps: float) -> float:
+        """Way from the slowest speed v0 to another, or back: (v^2 - v0^2) / (2 a) [m], a the share
+        ALONG of the acceleration."""
+        gained = max(speed_mps**2 - self.slowest_mps**2, 0.0)
+        return gained / (2.0 * ALONG * self.acceleration_mps2)
+
     def turn_radps(self, speed_mps: float) -> float:
         """Largest turn rate at a speed: omega_max, a lateral acceleration, a radius."""
         limit = TURN_SHARE * self.omega_max_radps

@@ -115,6 +115,12 @@ def kml(run: PlanRun) -> str:
         line = _child(mark, "LineString")
         _child(line, "altitudeMode", "absolute")
         _child(line, "coordinates", _coordinates(geodetic(run, run.path.position_m[rows])))
+    for name, ends in _before_and_after(run):
+        mark = _child(document, "Placemark")
+        _child(mark, "name", name)
+        line = _child(mark, "LineString")
+        _child(line, "altitudeMode", "absolute")
+        _child(line, "coordinates", _coordinates(geodetic(run, ends)))
     for target in run.result.targets:
         mark = _child(document, "Placemark")
         _child(mark, "name", f"target {visible(target.name or str(target.id))}")
@@ -124,6 +130,15 @@ def kml(run: PlanRun) -> str:
         _child(point, "coordinates", _coordinates(geodetic(run, place)))
     Xml.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root, "unicode") + "\n"
+
+
+def _before_and_after(run: PlanRun) -> Iterator[tuple[str, Any]]:
+    """The run-up and the run-out: name, and both ends."""
+    places, beside = run.path.position_m, run.approach
+    if beside.run_up_m is not None:
+        yield "run-up, not logged", np.stack([beside.run_up_m, places[0]])
+    if beside.run_out_m is not None:
+        yield "run-out, not logged", np.stack([places[-1], beside.run_out_m])
 
 
 def _child(parent: Xml.Element, name: str, text: str | None = None) -> Xml.Element:
@@ -182,8 +197,9 @@ def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
     path, commanded_m = run.path, _commanded(run)
     places, height = geodetic(run, commanded_m), -commanded_m[:, 2]
     yaw = np.unwrap(path.euler_rad[:, 2])
+    begun = places[0] if run.approach.run_up_m is None else _beside(run, run.approach.run_up_m)
     if run.motion in ("multirotor", "fixed_wing"):
-        yield _item(TAKEOFF, [0, 0, 0, None, *_place(places[0], height[0])])
+        yield _item(TAKEOFF, [0, 0, 0, None, *_place(begun, height[0])])
     said = -1.0
     kept = corners(path.time_s, commanded_m, yaw if run.motion == "multirotor" else None)
     headed = _headed(run, kept, yaw)
@@ -196,9 +212,21 @@ def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
             yield _item(CHANGE_SPEED, [1, speed, -1, 0, 0, 0, 0], MISSION)
             said = speed
         yield from headed.get(k, ())
-        hold = 0.0 if moving else round(lasts, 1)
         to = round(math.degrees(yaw[k]) % 360.0, 1)
+        if k == 0 and run.approach.run_up_m is not None:
+            said = round(run.approach.begins_mps, 2)
+            yield _item(WAYPOINT, [0, 0, 0, to, *_place(begun, height[0])])
+            yield _item(CHANGE_SPEED, [1, said, -1, 0, 0, 0, 0], MISSION)
+        hold = 0.0 if moving else round(lasts, 1)
         yield _item(WAYPOINT, [hold, 0, 0, to, *_place(places[k], height[k])])
+    if run.approach.run_out_m is not None:  # without it an autopilot brakes before the end
+        yield _item(
+            WAYPOINT, [0, 0, 0, to, *_place(_beside(run, run.approach.run_out_m), height[-1])]
+        )
+
+
+def _beside(run: PlanRun, place_m: Any) -> Any:
+    return geodetic(run, place_m[None, :])[0]
 
 
 def _commanded(run: PlanRun) -> Any:
