@@ -89,10 +89,14 @@ def clearly_two(data: Data, two: Model, one: Model, free: Sequence[Signature]) -
     return one.nll - two.nll > CLEAR_NATS + paid
 
 
+def asked_in_pairs(found: Signature) -> bool:
+    """Whether it is looked at beside another one: what a build can be wrong by."""
+    return found.plain and found.candidate.effect.asked_jointly
+
+
 def _pairs(free: Sequence[Signature]) -> list[tuple[int, int]]:
     """Of what is asked jointly, whatever two."""
-    asked = [k for k, s in enumerate(free) if s.plain and s.candidate.effect.asked_jointly]
-    return list(combinations(asked, 2))
+    return list(combinations([k for k, s in enumerate(free) if asked_in_pairs(s)], 2))
 
 
 def _freedom(free: Sequence[Signature], one: tuple[int, int]) -> int:
