@@ -16,6 +16,7 @@ import pytest
 
 from syncline_design.clocks.reading import read_logs
 from syncline_design.clocks.series import ClockSeries
+from syncline_design.clocks.sessions import sessions_of
 
 PATHS = os.environ.get("PATH", "") + os.pathsep + "/usr/sbin:/sbin"
 CHRONYD, PTP4L = shutil.which("chronyd", path=PATHS), shutil.which("ptp4l", path=PATHS)
@@ -28,6 +29,17 @@ ip link set lo up
 "$CHRONYD" -x -d -U -u root -f client.conf > client.out 2>&1 & B=$!
 sleep 6
 kill $A $B; wait
+"""
+RESTARTS = """\
+ip link set lo up
+"$CHRONYD" -x -d -U -u root -f server.conf > server.out 2>&1 & A=$!
+for run in 1 2 3; do
+    "$CHRONYD" -x -d -U -u root -f client.conf > client.out 2>&1 & B=$!
+    sleep 3.5
+    kill $B; wait $B
+    sleep 1.5
+done
+kill $A; wait
 """
 PTP = """\
 ip link add va type veth peer name vb
@@ -62,23 +74,40 @@ def _only(paths: list[Path], name: str) -> ClockSeries:
     return found
 
 
+def _chrony_logs(folder: Path, script: str, shift_s: float = 0.0) -> list[Path]:
+    """tracking, measurements and statistics of a client of a server of its own."""
+    (folder / "server.conf").write_text(
+        f"local stratum 3\nallow 127.0.0.1\nport 11123\ncmdport 0\nbindcmdaddress /\n"
+        f"pidfile {folder}/server.pid\n"
+    )
+    (folder / "client.conf").write_text(
+        f"server 127.0.0.1 port 11123 minpoll -4 maxpoll -4 offset {shift_s}\nport 0\ncmdport 0\n"
+        f"logdir {folder}\nlog tracking measurements statistics\nbindcmdaddress /\n"
+        f"pidfile {folder}/client.pid\ndriftfile {folder}/client.drift\n"
+    )
+    _run(script, folder, CHRONYD=CHRONYD)
+    logs = [folder / f"{name}.log" for name in ("tracking", "measurements", "statistics")]
+    if not all(log.exists() for log in logs):
+        pytest.skip("chronyd did not start here")
+    return logs
+
+
+@pytest.mark.skipif(CHRONYD is None, reason="chronyd is not installed")
+def test_each_start_of_a_real_chronyd_begins_a_session(tmp_path: Path) -> None:
+    """Into the same logs, away for 1.5 s: the second and third start know their drift."""
+    series = read_logs(_chrony_logs(tmp_path, RESTARTS)).series
+    assert len(series) == 3
+    for one in series:
+        starts = [cut.series.time_s[0] for cut in sessions_of(one, 3600.0)]
+        assert len(starts) == 3, one.kind.name
+        assert np.diff(starts) == pytest.approx([5.0, 5.0], abs=2.0)
+
+
 @pytest.mark.skipif(CHRONYD is None, reason="chronyd is not installed")
 @pytest.mark.parametrize("shift_s", [0.0, 0.02])
 def test_the_three_logs_of_a_real_chronyd_agree_in_sign(tmp_path: Path, shift_s: float) -> None:
     """`offset 0.02` makes the server seem 20 ms ahead: the client's clock is 20 ms late."""
-    (tmp_path / "server.conf").write_text(
-        f"local stratum 3\nallow 127.0.0.1\nport 11123\ncmdport 0\nbindcmdaddress /\n"
-        f"pidfile {tmp_path}/server.pid\n"
-    )
-    (tmp_path / "client.conf").write_text(
-        f"server 127.0.0.1 port 11123 minpoll -4 maxpoll -4 offset {shift_s}\nport 0\ncmdport 0\n"
-        f"logdir {tmp_path}\nlog tracking measurements statistics\nbindcmdaddress /\n"
-        f"pidfile {tmp_path}/client.pid\n"
-    )
-    _run(CHRONY, tmp_path, CHRONYD=CHRONYD)
-    logs = [tmp_path / f"{name}.log" for name in ("tracking", "measurements", "statistics")]
-    if not all(log.exists() for log in logs):
-        pytest.skip("chronyd did not start here")
+    logs = _chrony_logs(tmp_path, CHRONY, shift_s)
     tracking, measurements, statistics = (_only([log], f"chrony {log.stem}") for log in logs)
     assert len(measurements) > 20
     # with -x a clock of chronyd's own is steered: only the first figures show the shift

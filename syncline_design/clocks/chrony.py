@@ -33,10 +33,12 @@ TRACKING: Final = SourceKind("chrony tracking", "chrony", 1, "servo", "utc")
 
 @dataclass(slots=True)
 class ChronyReader:
-    """One file; which of its banners say that it was opened anew.
+    """One file; which of its lines say that the daemon began anew, or its log was opened anew.
 
     chronyd writes a banner before the first line that it writes into a file, and each so many lines
-    from there on: one that comes out of turn is a start of the daemon (or of its logs).
+    from there on: one that comes out of turn is a start of the daemon, or of its logs alone
+    (`chronyc cyclelogs`).  Before a line without a reference and with the bound of a start it is
+    the daemon's: a server that is lost writes such a line as well, but in turn with others.
     """
 
     lines: int = 0
@@ -46,6 +48,7 @@ class ChronyReader:
     anew: bool = False
     counted: bool = False  # a file may begin between two banners
     in_lock: bool = True  # of the tracking log, before this line
+    small: bool = False  # the bound of that line
     last_s: float = float("nan")
 
     def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
@@ -57,23 +60,29 @@ class ChronyReader:
         if found is None:
             return None
         kind, said, reference = found
-        if self.after_banner:
-            self._turn(said.time_s)
+        as_at_start = said.opened and not said.locked
+        begun = self._turn(said.time_s, as_at_start=as_at_start) if self.after_banner else False
         self.lines, self.last_s = self.lines + 1, said.time_s
         # without a reference chronyd's dispersion is 1 s as well: no start where it was so before
         by_bound = said.opened and said.locked and self.in_lock
         opened = by_bound or (self.anew and kind.name not in self.named)
-        self.in_lock = said.locked
+        begun |= by_bound and self.small and _bound_before(line) >= _STARTING_S
+        self.in_lock, self.small = said.locked, not said.opened
         self.named.add(kind.name)
-        return kind, said._replace(opened=opened), reference
+        restart = said.restart or begun
+        return kind, said._replace(restart=restart, opened=opened), reference
 
-    def _turn(self, time_s: float) -> None:
-        if time_s - self.last_s <= _CYCLE_S:
+    def _turn(self, time_s: float, *, as_at_start: bool) -> bool:
+        """What the banner before this line says; True: the daemon began anew."""
+        in_turn = self.lines in self.turns
+        begun = as_at_start and not (self.counted and in_turn)
+        if time_s - self.last_s <= _CYCLE_S and not begun:
             self.turns.add(self.lines)
         self.anew = self.counted and self.lines not in self.turns
         self.counted = True
         self.after_banner, self.lines = False, 0
         self.named.clear()
+        return begun
 
 
 def row(line: str) -> tuple[SourceKind, Row, str] | None:
@@ -140,6 +149,15 @@ def _tracking(time_s: float, cells: list[str]) -> Row:
     rate = 1e-6 * float(cells[4])
     return Row(time_s, offset, hard, locked, rate, 1e-6 * skew, restart, hard >= _STARTING_S,
                float(cells[3]), float(cells[8]))  # fmt: skip
+
+
+def _bound_before(line: str) -> float:
+    """`Max. error` [s]: what the clock was within before the update that the line tells of.
+
+    A run in lock does not come near the 1.5 s of a start, whatever the offset or the next server.
+    """
+    cells = line.split()
+    return float(cells[13]) if len(cells) >= 14 else float("nan")
 
 
 def _measurement(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str]:

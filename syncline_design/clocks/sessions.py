@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from syncline_design.clocks.chrony import TRACKING
 from syncline_design.clocks.series import Array, ClockSeries, Flags
 from syncline_design.clocks.starts import OF_NO_STARTS, cuts
 from syncline_design.machine.quick_dataclass import dataclass
@@ -113,7 +114,7 @@ class ClockSession:
     @property
     def hard_s(self) -> float:
         """The largest hard bound of the steady state, with drift over the time between samples."""
-        hard = self.series.hard_s[self.steady]
+        hard = np.where(_of_unlocked(self.series), math.nan, self.series.hard_s)[self.steady]
         if not np.any(np.isfinite(hard)):
             return math.nan
         skew = np.nan_to_num(self.series.skew[self.steady])
@@ -239,6 +240,15 @@ def _after_the_first(rows: Flags) -> Flags:
     found = rows.copy()
     if np.any(rows):
         found[int(np.argmax(rows))] = False
+    return found
+
+
+def _of_unlocked(series: ClockSeries) -> Flags:
+    """Rows that lock came back with, whose bound is of the time before it: chronyd's `Max. error`
+    is what the clock was within until the update that a row tells of."""
+    found = np.zeros(len(series), dtype=bool)
+    if series.kind.name == TRACKING.name:
+        found[1:] = series.locked[1:] & ~series.locked[:-1]
     return found
 
 

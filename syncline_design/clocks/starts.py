@@ -23,9 +23,9 @@ _FIRST_UPDATE_S: Final = 1024.0  # chronyd's largest usual poll: sources tell of
 def cuts(series: ClockSeries, gap_s: float) -> NDArray[np.int64]:
     """The first rows of all runs but the first.
 
-    After a silence longer than `gap_s` a daemon has to have begun anew: only its own word for that
-    (another process, a log opened anew, a bound or a wander as at a start) makes the silence the
-    end of a run.
+    A daemon that says that it began anew (another process, a bound or a wander as at a start)
+    begins a run, however short it was away.  After a silence longer than `gap_s` a log that was
+    opened anew is such a word too: a silence alone is none.
     """
     steps = np.diff(series.time_s)
     begun = series.restart[1:] & ~series.restart[:-1]  # several such lines are one start
@@ -48,9 +48,29 @@ def silences(series: ClockSeries, gap_s: float) -> list[int]:
 def with_starts(series: Sequence[ClockSeries]) -> list[ClockSeries]:
     """Starts that chronyd tells of in its tracking log, in its other logs too."""
     tracked = [one for one in series if one.kind == TRACKING]
-    begun = [one.time_s[one.restart | one.opened] for one in tracked]
-    starts = np.sort(np.concatenate(begun)) if begun else np.zeros(0)
-    return [_marked(one, starts) if _is_beside(one) and starts.shape[0] else one for one in series]
+    opened = [one.time_s[one.opened & ~one.restart] for one in tracked]
+    openings = np.sort(np.concatenate(opened)) if opened else np.zeros(0)
+    breaks = [pair for one in tracked for pair in _breaks(one)]
+    return [_begun(_marked(one, openings), breaks) if _is_beside(one) else one for one in series]
+
+
+def _breaks(tracking: ClockSeries) -> list[tuple[float, float]]:
+    """Of each start within a tracking log: the stamps of the last row before it and its first."""
+    places = np.flatnonzero(tracking.restart[1:] & ~tracking.restart[:-1])
+    return [(float(tracking.time_s[k]), float(tracking.time_s[k + 1])) for k in places]
+
+
+def _begun(one: ClockSeries, breaks: Sequence[tuple[float, float]]) -> ClockSeries:
+    """A run begins after the longest silence of those that lie in a break of the tracking log.
+
+    Sources are measured before the first update that the tracking log tells of, and after the last.
+    """
+    restart, steps = one.restart.copy(), np.diff(one.time_s)
+    for before, after in breaks:
+        places = np.flatnonzero((one.time_s[:-1] < after) & (one.time_s[1:] > before))
+        if places.shape[0]:
+            restart[places[np.argmax(steps[places])] + 1] = True
+    return replace(one, restart=restart)
 
 
 def _is_beside(one: ClockSeries) -> bool:
