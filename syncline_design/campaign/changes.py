@@ -41,6 +41,7 @@ from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
 from syncline_design.campaign.scatter import (
+    APART,
     RunScatter,
     freed_of,
     log_bayes,
@@ -210,11 +211,15 @@ class Changes:
     def doubt(self, look: int) -> float:
         """log (1 + sum p_a L_a): how much likelier the first runs are where some effect may differ
         from run to run than where none does."""
+        return float(np.logaddexp.reduce([0.0, *self.log_odds(look).ravel()]))
+
+    def log_odds(self, look: int) -> Array:
+        """log p_a L_a of every effect, by each of APART, (C, S)."""
         runs, inside = self.compared(look), self.inside(look)
         prior = runs.total - runs.normal.sum(axis=0)
         usual = runs.normal.mean(axis=0)
-        found = [np.zeros(1)]
-        for term, factor in zip(self.terms, inside, strict=True):
+        found = np.zeros((len(self.terms), len(APART)))
+        for k, (term, factor) in enumerate(zip(self.terms, inside, strict=True)):
             by = log_differing(
                 runs.normal / factor,
                 runs.score / factor,
@@ -222,8 +227,8 @@ class Changes:
                 term.index,
                 inverted(usual[np.ix_(term.index, term.index)]) * factor,
             )
-            found.append(log_odds_apart(len(self.terms)) + by)
-        return float(np.logaddexp.reduce(np.concatenate(found)))
+            found[k] = log_odds_apart(len(self.terms)) + by
+        return found
 
     @cached_property
     def course(self) -> Array:

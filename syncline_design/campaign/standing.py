@@ -60,21 +60,32 @@ def standing(changes: Changes, strange: Sequence[Stranger]) -> StandingAlone:
         if not still:
             break
         spans = [_explaining(left, int(np.flatnonzero(rows == one.run)[0]), one) for one in still]
-        best = max(range(len(spans)), key=lambda k: spans[k].gain)
-        one, span = still[best], spans[best]
+        span = max(spans, key=lambda one: one.gain)
         change = _changed(left)
-        if change is not None and _explained(left, change) > span.gain:
-            left = left.without(change)
-        elif span.end - span.first == 1:
+        as_change = change is not None and _explained(left, change) > span.gain
+        ends = (change.k, len(rows)) if change is not None and as_change else (span.first, span.end)
+        lone = _lone(ends, len(rows))
+        one = None if lone is None else next((s for s in still if s.run == rows[lone]), None)
+        if one is not None and lone is not None:
             kept.append(one)
-            stays = np.delete(np.arange(len(rows)), span.first)
+            stays = np.delete(np.arange(len(rows)), lone)
             rows, left = rows[stays], part_of(left, stays)
             still.remove(one)
+        elif change is not None and as_change:
+            left = left.without(change)
         else:
             left = _less(left, span)
         still = list(_still(left, rows, still, limit))
     kept = sorted([*kept, *still], key=lambda one: one.run)
     return StandingAlone(tuple(one.run for one in kept if 0 < one.run < last), tuple(kept))
+
+
+def _lone(ends: tuple[int, int], count: int) -> int | None:
+    """The one run that has a change, or the first where all but it have; None where several do."""
+    first, end = ends
+    if end - first == 1:
+        return first
+    return 0 if (first, end) == (1, count) else None
 
 
 def _changed(changes: Changes) -> Change | None:

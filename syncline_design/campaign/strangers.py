@@ -5,9 +5,12 @@ information, of the others with what is known of the constants, and g that of al
     W = I_r - I_r S^-1 I_r,   u = g_r - I_r S^-1 g
 are information and score of what is another in this run alone; of effects C
     d = W_CC^-1 u_C,   u_C' W_CC^-1 u_C ~ chi-square where nothing is,
-over the scatter inside runs and that between the others.  What differs from run to run anyway is
+over the scatter inside runs and that between the others.  What clearly differs from run to run is
 freed, and Fisher's F of as many free values as the others have takes the place of chi-square then;
-of a few runs nobody knows that, and each effect is taken to differ by three bounds of a run.
+of a few runs nobody knows that, and each effect is taken to differ by three bounds of a run.  Any
+effect may differ less clearly, by the odds p_a and the likelihood L_a of the others (`changes`): of
+the chances P_a of the departure where it does and P_0 where none does the mean counts,
+    P = (P_0 + sum p_a L_a P_a) / (1 + sum p_a L_a).
 Two that are strange alike hide each other, so that the oddest are held against the others without
 one another, too.  A run is a stranger where the chance of that, times runs and effects
 (Bonferroni), is below its look's share of `RATE`: 2 / (n (n - 1)) after n runs, so that the chance
@@ -24,7 +27,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Changes, pseudo_inverse
+from syncline_design.campaign.changes import Changes, Runs, pseudo_inverse
 from syncline_design.campaign.pool import Index, Term, inverted
 from syncline_design.campaign.scatter import APART, freed_of
 from syncline_design.diagnosis.candidates import commonness
@@ -150,59 +153,111 @@ def _held(changes: Changes, run: int, apart: tuple[int, ...]) -> Odd:
     normal, score = changes.pool.normal[run][None], changes.pool.score[run][None]
     for one in runs.freed:
         normal, score = freed_of(normal, score, one.term.index, one.covariance)
-    inverse = pseudo_inverse(runs.total + normal[0])
-    fit = inverse @ (runs.score.sum(axis=0) + score[0])
     between = {t.label: 1.0 for t in changes.terms}
     for group, scatter in zip(others.groups, runs.scatters, strict=True):
         for k, factor in zip(group.terms, scatter.factor[-1], strict=True):
             between[others.terms[int(k)].label] = float(factor)
     inside = np.maximum(changes.inside(changes.pool.count), changes.within[run])
-    temper = inside * np.array([between[t.label] for t in changes.terms])
+    known = Known(others, runs, normal[0], score[0])
+    factor = np.array([between[t.label] for t in changes.terms])
+    doubt = 1.0 if changes.pool.count >= SCATTER_KNOWN else 1.0 + APART[-1] ** 2
     tries = changes.pool.count ** (1 + len(apart))
-    return Odd(changes, normal[0] - normal[0] @ inverse @ normal[0], score[0] - normal[0] @ fit,
-               temper, tries, len(rest) - 1 if runs.freed else None,
-               1.0 if changes.pool.count >= SCATTER_KNOWN else 1.0 + APART[-1] ** 2)  # fmt: skip
+    return Odd(changes, known, inside, inside * factor, tries, doubt)
+
+
+@dataclass(frozen=True, eq=False)
+class Own:
+    """Information W (P, P) and score u (P,) of what is another in one run alone, and log of how
+    likely it is that runs differ as they are freed there."""
+
+    normal: Array
+    score: Array
+    log_share: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A run (normal, score) beside others; what clearly differs from run to run freed in all."""
+
+    others: Changes
+    runs: Runs
+    normal: Array
+    score: Array
+
+    @cached_property
+    def alike(self) -> Own:
+        """Where nothing else differs from run to run."""
+        return self._own(self.normal, self.score)
+
+    @cached_property
+    def apart(self) -> tuple[Own, ...]:
+        """The same where nothing or one effect does, by each of APART; shares sum to 1."""
+        odds = self.others.log_odds(len(self.runs.normal))
+        total = float(np.logaddexp.reduce([0.0, *odds.ravel()]))
+        found = [replace(self.alike, log_share=-total)]
+        usual = self.runs.normal.mean(axis=0)
+        more = 1.0 + 1.0 / len(self.runs.normal)  # the mean of the others is as uncertain by it
+        for term, own in zip(self.others.terms, odds, strict=True):
+            spread = more * inverted(usual[np.ix_(term.index, term.index)])
+            for size, log_odds in zip(APART, own, strict=True):
+                freed = freed_of(self.normal[None], self.score[None], term.index, size**2 * spread)
+                one = self._own(*(each[0] for each in freed))
+                found.append(replace(one, log_share=float(log_odds) - total))
+        return tuple(found)
+
+    def _own(self, normal: Array, score: Array) -> Own:
+        inverse = pseudo_inverse(self.runs.total + normal)
+        fit = inverse @ (self.runs.score.sum(axis=0) + score)
+        return Own(normal - normal @ inverse @ normal, score - normal @ fit)
 
 
 @dataclass(frozen=True, eq=False)
 class Odd:
-    """What is another in one run alone: information W (P, P), score u (P,); temper: variance of
-    each effect over that fitted, (C,).  tries: runs, or pairs of them, that were tried.  known:
-    free values by which the scatter of the others is known, where it was freed.  doubt: variance
-    over that again, where runs are too few to tell how an effect scatters."""
+    """A run held against others.  inside, temper: variance of each effect over that fitted, inside
+    runs and of them, (C,).  tries: runs, or pairs of them, that were tried.  doubt: variance over
+    temper again, where runs are too few to tell how an effect scatters."""
 
     changes: Changes
-    normal: Array
-    score: Array
+    known: Known
+    inside: Array
     temper: Array
     tries: int
-    known: int | None = None
-    doubt: float = 1.0
+    doubt: float
 
     @cached_property
     def charge(self) -> float:
         """log of how often chance was given a try."""
         return math.log(self.tries * max(len(self.changes.terms), 1))
 
-    def log_p(self, k: int, beside: Sequence[int]) -> float:
-        """log of the chance of one effect's departure beside those of others."""
+    def log_p(self, k: int, beside: Sequence[int], limit: float = 0.0) -> float:
+        """log of the chance of one effect's departure beside those of others, as it is where
+        nothing else differs if that is no less than the limit."""
+        temper, inside = self.doubt * float(self.temper[k]), float(self.inside[k])
+        first = self._chance(self.known.alike, k, beside, temper) + self.charge
+        if first >= limit:
+            return first
+        alike, *apart = self.known.apart
+        each = [self._chance(one, k, beside, inside) + one.log_share for one in apart]
+        return float(np.logaddexp.reduce([first + alike.log_share, *np.add(each, self.charge)]))
+
+    def _chance(self, own: Own, k: int, beside: Sequence[int], temper: float) -> float:
         index = self.changes.terms[k].index
-        free = int(np.sum(np.diag(self.normal)[index] > 0.0))
-        more = self.square((*beside, k)) - self.square(beside)
+        free = int(np.sum(np.diag(own.normal)[index] > 0.0))
         if not free:
             return 0.0
-        square = max(more, 0.0) / float(self.doubt * self.temper[k])
-        if self.known is not None:
-            return log_f(square / free, free, self.known) + self.charge
-        return log_p_of(square, free) + self.charge
+        more = self.square((*beside, k), own) - self.square(beside, own)
+        square = max(more, 0.0) / temper
+        if self.known.runs.freed:
+            return log_f(square / free, free, len(self.known.runs.normal) - 1)
+        return log_p_of(square, free)
 
-    def square(self, taken: Sequence[int]) -> float:
+    def square(self, taken: Sequence[int], own: Own | None = None) -> float:
         """u' W^-1 u of some effects."""
-        index = self._index(taken)
+        index, held = self._index(taken), own or self.known.alike
         if not index.size:
             return 0.0
-        own = self.score[index]
-        return float(own @ inverted(self.normal[np.ix_(index, index)]) @ own)
+        score = held.score[index]
+        return float(score @ inverted(held.normal[np.ix_(index, index)]) @ score)
 
     def _index(self, taken: Sequence[int]) -> Index:
         none = np.zeros(0, dtype=np.int64)
@@ -216,19 +271,19 @@ class Odd:
             if one is None:
                 break
             taken.append(one)
-        stay = [k for k in taken if self.log_p(k, [b for b in taken if b != k]) < limit]
+        stay = [k for k in taken if self.log_p(k, [b for b in taken if b != k], limit) < limit]
         index = self._index(stay)
-        covariance = inverted(self.normal[np.ix_(index, index)])
-        values, at = covariance @ self.score[index], 0
+        covariance = inverted(self.known.alike.normal[np.ix_(index, index)])
+        values, at = covariance @ self.known.alike.score[index], 0
         for k in stay:
             term = self.changes.terms[k]
             own = slice(at, at + term.size)
             at += term.size
             judged = Judged(values[own], float(self.temper[k]) * covariance[own, own])
-            yield Departure(term, judged, self.log_p(k, [b for b in stay if b != k]))
+            yield Departure(term, judged, self.log_p(k, [b for b in stay if b != k], limit))
 
     def _next(self, taken: Sequence[int], limit: float) -> int | None:
-        chances = {k: self.log_p(k, taken) for k in range(len(self.changes.terms))
+        chances = {k: self.log_p(k, taken, limit) for k in range(len(self.changes.terms))
                    if k not in taken}  # fmt: skip
         odd = [k for k, chance in chances.items() if chance < limit]
         if not odd:

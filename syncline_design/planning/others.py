@@ -87,7 +87,8 @@ def taken_by(
     others: Others, goal: Goal, information: Array, prior: Array
 ) -> dict[int, dict[int, float]]:
     """What is wanted that other effects, each as large as is plausible, would leave beyond twice
-    what is asked, or beyond their limit: by the first place of the effect, the sigma of each."""
+    what is asked, or beyond their limit: by the first place of the effect, the sigma of each.  The
+    effect first that leaves most, over what it may."""
     wanted = list(goal.wanted)
     if not len(others.index):
         return {}
@@ -97,8 +98,11 @@ def taken_by(
     asked = np.isfinite(goal.tolerance)
     most = np.where(asked, TWICE * goal.tolerance, others.limit * sigma)
     beyond = np.isfinite(others.limit) & (left > most)
+    harm = np.max(np.where(beyond, left / most, 0.0), axis=1)
     return {
-        int(others.index[row, 0]): {wanted[k]: float(left[row, k]) for k in np.flatnonzero(own)}
-        for row, own in enumerate(beyond)
-        if np.any(own)
+        int(others.index[row, 0]): {
+            wanted[k]: float(left[row, k]) for k in np.flatnonzero(beyond[row])
+        }
+        for row in map(int, np.argsort(-harm, kind="stable"))
+        if harm[row] > 0.0
     }

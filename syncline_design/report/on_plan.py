@@ -11,6 +11,7 @@ from syncline_design.machine.records import with_texts
 from syncline_design.model.figure_text import format_duration, format_like, format_quantity
 from syncline_design.model.quantity import si_name, split_suffix, suffix_unit
 from syncline_design.model.unit_table import Dimension
+from syncline_design.planning.legs import speed_words
 from syncline_design.planning.path import PathStates
 from syncline_design.planning.result import Flown, Lacking, Plan, Separated
 from syncline_design.planning.run import LONGEST_S
@@ -118,10 +119,10 @@ def _sentences(found: Plan) -> Iterator[Inline]:
             yield f"No drive of this platform tells {words} apart, {_how_far(found)}."
     if found.reached:
         asked = "else that" if found.inseparable else "that"
+        stays = "within twice what is asked" if found.tolerance else "told"
         yield (
-            f"All {asked} is asked is reached, and none of the other effects that a drive can tell "
-            f"apart would take it, left free one at a time{_steps(found)}"
-            f"{', beyond twice what is asked' if found.tolerance else ''}."
+            f"All {asked} is asked is reached, and stays {stays} when any one of the other effects "
+            f"that a drive can tell apart is free as well{_steps(found)}."
         )
     if found.confused:
         yield _would_take(found.confused)
@@ -186,7 +187,8 @@ def _known_otherwise(found: Plan) -> str:
     ]
     return (
         "Taken as known, since nothing that can be driven tells them from what is asked, or only "
-        f"what takes many times as long: {'; '.join(each)}. Ask for them as well to have it."
+        f"what takes many times as long, the most harmful first: {'; '.join(each)}. Ask for one as "
+        "well to have it told."
     )
 
 
@@ -289,7 +291,7 @@ def _legs(found: Plan, path: PathStates) -> list[Node]:
     ]  # fmt: skip
     heads = ("Leg", "From, to", "Heading", *(["Stage"] if several else []), "What to do")
     begun_mps = math.hypot(*path.velocity_mps[0, :2])  # what heaves a ship is no way
-    how = f"at {numbers.speed(begun_mps, 2)}" if begun_mps > STANDS_MPS else "at rest"
+    how = f"at {numbers.typeset(speed_words(begun_mps))}" if begun_mps > STANDS_MPS else "at rest"
     every = ", and so does every leg; its turn counts as its time" if len(found.legs) > 1 else ""
     words = f"The drive begins {how}{every}."
     return [*show(table("Legs", heads, rows), silent=True), Text(words, quiet=True)]

@@ -199,11 +199,38 @@ def _parameter(one: Alarm) -> str:
 
 def _facts(found: Watch) -> Iterator[tuple[str, str]]:
     if found.e_value is not None:
-        yield "Evidence for a change", f"e-value {e_value_text(found.e_value)}"
+        yield "Evidence for a change", _e_values(found)
         yield "Alarm", f"from {numbers.number(found.rule.threshold, 3)} on, at any look"
-    yield "Runs", str(len(found.runs))
+    yield "Runs", _counted(found)
     if found.baseline_after:
         yield "Baseline", f"after run {found.baseline_after}"
+
+
+def _e_values(found: Watch) -> str:
+    """`e-value 40 at run 7, 0.8 by now`: that of an alarm which stays is the one that rang."""
+    now = 0.0 if found.e_value is None else found.e_value
+    rang = [one for one in found.alarms if one.e_value is not None]
+    if not rang or now >= found.rule.threshold:
+        return f"e-value {e_value_text(now)}"
+    first = min(rang, key=lambda one: one.first_run)
+    known = next((r.e_value for r in found.runs if r.run == first.first_run), None)
+    then = first.e_value if known is None or known < found.rule.threshold else known
+    if then is None or then < found.rule.threshold:
+        return f"e-value {e_value_text(now)}"
+    return f"e-value {e_value_text(then)} at run {first.first_run}, {e_value_text(now)} by now"
+
+
+def _counted(found: Watch) -> str:
+    """`13 held against one another, 2 before the baseline, 1 left out`: all that the store has."""
+    compared = _looks(found)
+    apart = len([r for r in found.runs if r.left_out])
+    before = len(found.runs) - compared - apart
+    if compared == len(found.runs):
+        return str(compared)
+    parts = [f"{compared} held against one another"]
+    parts += [f"{before} before the baseline"] if before else []
+    parts += [f"{apart} left out"] if apart else []
+    return ", ".join(parts)
 
 
 def _alarms(found: Watch) -> list[Node]:
