@@ -11,6 +11,7 @@ import pytest
 from browsing import flaws_of
 from html_page import Page
 from syncline_design.campaign.watch_result import e_value_text
+from syncline_design.model.figure_text import format_estimate, format_interval
 from watched_series import (
     BOUND,
     LABELS,
@@ -99,3 +100,10 @@ def test_many_runs_have_round_ticks_and_a_table_of_bounded_height(
     assert 'class="scroll long' in page
     drawn = "".join(page.split('id="fig-courses')[1:])
     assert drawn.count("<path") < 75 * len(LABELS)  # not one for every run and parameter
+
+
+def test_an_interval_has_the_place_of_its_estimate() -> None:
+    """`1.54 ± 0.10 ms` goes from 1.34 to 1.74 ms, not from 1.345 to 1.74."""
+    assert format_estimate(1.5425e-3, 0.1e-3, "s") == "1.54 ± 0.10 ms"
+    assert format_interval(1.5425e-3, 0.1e-3, (1.344e-3, 1.74e-3), "s") == "1.34 ms to 1.74 ms"
+    assert format_interval(2.0, 0.0, (1.0, 3.25), "m") == "1 m to 3.25 m"

@@ -85,10 +85,27 @@ def _estimate(value: float, uncertainty: float | None, name: str, scale: float) 
     if uncertainty is None or not uncertainty > 0.0 or not math.isfinite(uncertainty):
         return f"{to_digits(shown, 4)} {name}".strip()
     spread = uncertainty / scale
-    mantissa, exponent = f"{spread:.1e}".split("e")
-    digits = 1 if float(mantissa) < 3.0 else 0  # two figures of 1.0 to 2.9, else one
-    places = max(0, digits - int(exponent))
+    places = _places(spread)
     return f"{to_places(shown, places)} ± {to_places(spread, places)} {name}".strip()
+
+
+def _places(spread: float) -> int:
+    """Decimals that an uncertainty is told to: two figures of 1.0 to 2.9, else one."""
+    mantissa, exponent = f"{spread:.1e}".split("e")
+    return max(0, (1 if float(mantissa) < 3.0 else 0) - int(exponent))
+
+
+def format_interval(
+    value: float, uncertainty: float, ends: tuple[float, float], unit: str = ""
+) -> str:
+    """`1.35 ms to 1.74 ms`: the ends of an interval in the unit and to the place in which
+    `format_estimate` tells the value; without an uncertainty to four figures each."""
+    name, scale = _rung(abs(value), unit)
+    spread = uncertainty / scale
+    known = spread > 0.0 and math.isfinite(spread)
+    texts = [to_places(end / scale, _places(spread)) if known else to_digits(end / scale, 4)
+             for end in ends]  # fmt: skip
+    return " to ".join(f"{text} {name}".strip() for text in texts)
 
 
 def format_estimates(

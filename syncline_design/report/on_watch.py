@@ -11,7 +11,7 @@ from syncline_design.diagnosis.result import BlindSpot, UnlikeOthers
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
-from syncline_design.model.figure_text import format_estimates
+from syncline_design.model.figure_text import format_interval
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
@@ -241,9 +241,10 @@ def _alarm(one: Alarm) -> Node:
     what = "Departure" if one.alone else "Change"
     facts: list[tuple[str, str]] = [(f"{what} of {_parameter(one)}", one.text)]
     if one.interval95 is not None and one.change is not None:
-        ends = ((value, None) for value in (one.change, *one.interval95))  # in the change's unit
-        _, low, high = map(numbers.typeset, format_estimates(tuple(ends), one.unit))
-        facts.append(("95 % interval", f"{low} to {high}"))
+        told = format_interval(
+            one.change, one.standard_uncertainty or 0.0, one.interval95, one.unit
+        )
+        facts.append(("95 % interval", numbers.typeset(told)))
     since = f"run {one.since.run}, {one.since.file}"
     facts.append(
         ("In" if one.alone else "Since", since + (f", {one.since.date}" if one.since.date else ""))
