@@ -174,3 +174,27 @@ def test_a_flown_log_that_the_platform_cannot_have_made_is_said_to_be_odd(
     done = call(fast, "--reach", "latency(position)=100 ms", "--flown", straight[1], "-o", "json:-")
     flown = json.loads(done.stdout)["flown"]
     assert any("the spec's v_max is 0.5 m/s" in one for one in flown["cautions"])
+
+
+def test_several_flown_drives_tell_what_all_of_them_do(
+    straight: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Of one parameter 1 / sigma^2 adds up; a drive that is given twice is no second one."""
+    spec, first = straight
+    line = scenario("straight_constant_speed", 3, 25.0, 10.0)
+    second = make_log(line, (), Noise()).to_csv(tmp_path / "second.csv")
+
+    def flown(*logs: Path) -> dict:
+        options = [word for log in logs for word in ("--flown", log)]
+        done = call(spec, "--reach", "latency(position)=100 ms", *options, "-o", "json:-")
+        return dict(json.loads(done.stdout)["flown"])
+
+    alone, both = [flown(log) for log in (first, second)], flown(first, second)
+    (key,) = both["sigma"]
+    known = sum(one["sigma"][key] ** -2 for one in alone)
+    assert both["sigma"][key] == pytest.approx(known**-0.5, rel=1e-6)
+    assert both["files"] == [first.name, second.name]
+    assert both["rows"] == sum(one["rows"] for one in alone)
+    twice = call(spec, "--reach", "latency(position)=100 ms", "--flown", first, "--flown", first)
+    assert twice.exit_code == 2
+    assert f"{first.name} is the drive of {first.name}" in twice.output

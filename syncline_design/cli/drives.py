@@ -59,7 +59,10 @@ def plan(
     minutes: Annotated[float, typer.Option(help="Time for the drive at most.")] = 10.0,
     flown: Annotated[
         list[Path] | None,
-        typer.Option(metavar="LOG", help="What a drive that was flown tells; repeatable."),
+        typer.Option(
+            metavar="LOG",
+            help="What a drive that was flown tells; of several, what all tell together.",
+        ),
     ] = None,
     output: PlanOutput = None,
     seed: SeedOption = 0,

@@ -69,8 +69,7 @@ def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
                 "it tells nothing that the files before it do not tell",
                 expected="files that are parts of one run, each with columns of its own",
                 found=f"a second log of {len(twice)} columns that are in {base.path.name} already",
-                hint="several runs of one system are taken together by `diagnose --joint`; `plan "
-                "--flown` asks for one drive at a time",
+                hint="several runs of one system are taken together by `diagnose --joint`",
             )
         if twice:
             notes.append(

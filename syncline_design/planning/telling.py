@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.result import SpecRead
-from syncline_design.diagnosis.scene import scene
-from syncline_design.diagnosis.system import measured
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.notebooks import Shown
@@ -24,10 +20,10 @@ from syncline_design.planning.approach import Approach, approach, run_up_words
 from syncline_design.planning.areas import beyond_areas, tight_areas
 from syncline_design.planning.drives import DrivenLeg, WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
+from syncline_design.planning.flown_drives import flown_drives
 from syncline_design.planning.from_diagnosis import cautions_of
 from syncline_design.planning.information import (
     canonical_correlation,
-    fisher,
     sigmas,
 )
 from syncline_design.planning.lacking import dear_legs, in_calm_water
@@ -55,7 +51,6 @@ from syncline_design.planning.setup import SECONDS, Setup
 from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
 from syncline_design.planning.wanted import (
     PairGoal,
-    PlanError,
     text_of,
 )
 
@@ -335,26 +330,20 @@ class Telling:
         return path, target, tuple(int(k) for k in leg)
 
     def _flown(self) -> Flown | None:
-        """A measured log held against what is asked: its own motion and targets, its own rate."""
+        """Measured logs held against what is asked, each with its own motion, targets and rate."""
         if not self.setup.request.flown:
             return None
-        in_force().doing("looking at the flown log")
-        inputs = measured(self.setup.case, self.setup.request.flown)
-        if len(inputs.system.stages) != len(self.setup.system.stages):
-            raise PlanError("--flown: the log holds not all stages of the spec")
-        view = scene(inputs.system, inputs.log, inputs.known)
-        own = replace(self.setup.world, rate_hz=self.setup.world.computed_hz)
-        structure, level = own.noise(view)
-        information = fisher(structure, level, self.setup.world.columns(view))
+        in_force().doing("looking at what was flown")
+        drives = flown_drives(self.setup, self.setup.request.flown)
         return Flown(
-            tuple(path.name for path in self.setup.request.flown),
-            inputs.log.duration_s,
-            len(inputs.log),
-            self._sigma(information),
-            self._correlation(information),
-            self.setup.judge.enough(information),
-            tuple(one.message for one in log_checks(view)) or None,
-            self._confused(information) or None,
+            drives.files,
+            drives.duration_s,
+            drives.rows,
+            self._sigma(drives.information),
+            self._correlation(drives.information),
+            self.setup.judge.enough(drives.information),
+            drives.cautions or None,
+            self._confused(drives.information) or None,
         )
 
 
