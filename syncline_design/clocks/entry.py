@@ -92,14 +92,18 @@ def write_entry(study: TimingStudy, timing: Timing, files: EntryFiles) -> None:
 
 def values_text(study: TimingStudy, kind: ClockEntryKind) -> str:
     """Quantiles of the error, one a line; of a method mu = -offset (valid at stamp + mu)."""
-    meaning = "host minus UTC" if kind == "clock" else "mu: data were valid at their stamp plus mu"
+    of = study.timing.source
+    name = harmless(of.name, one_line=True)
+    meaning = "host minus UTC" if of.of_host else f"{name} minus its reference"
+    if kind == "timestamping":
+        meaning = "mu: data were valid at their stamp plus mu"
     lines = [f"# {meaning}, quantiles of the time in lock, each session with the same weight", "s"]
     lines += [f"{value:.9g}" for value in values_of(study, kind)]
     return "\n".join(lines) + "\n"
 
 
 def values_of(study: TimingStudy, kind: ClockEntryKind) -> list[float]:
-    """Quantiles of the error [s]: host minus UTC of a clock, mu of a method."""
+    """Quantiles of the error [s]: clock minus reference of a clock, mu of a method."""
     sign = 1.0 if kind == "clock" else -1.0
     return sorted((sign * study.offsets_s).tolist())
 

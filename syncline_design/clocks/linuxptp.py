@@ -132,7 +132,7 @@ class PtpReader:
         rate = 1e-9 * int(freq) if freq else float("nan")
         return (
             kind,
-            Row(time_s, offset_s, hard, locked, rate, restart=restart),
+            Row(time_s, offset_s, hard, locked, rate, restart=restart, unsigned=found is None),
             (self.master if key[0] == "ptp4l" else ""),
         )
 

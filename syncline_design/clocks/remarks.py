@@ -36,7 +36,7 @@ def remarks(
     sessions: Sequence[ClockSession], results: Sequence[SessionResult], figures: SeenFigures
 ) -> list[str]:
     """Every one a sentence without its stop."""
-    said = [*_outages(sessions, figures.gap_s), *_other_crystals(sessions)]
+    said = [*_outages(sessions, figures.gap_s), *_other_crystals(sessions), *_unsigned(sessions)]
     short = sum(not s.is_counted for s in sessions)
     if short:
         said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
@@ -94,6 +94,16 @@ def _other_crystals(sessions: Sequence[ClockSession]) -> Iterator[str]:
         yield (f"the sessions' frequency corrections stand {to_digits(1e6 * apart, 3)} ppm apart, "
                "more than one crystal's in common weather: are these several hosts?"
                )  # fmt: skip
+
+
+def _unsigned(sessions: Sequence[ClockSession]) -> Iterator[str]:
+    """Offsets of which the size alone is told."""
+    count = sum(int(np.sum(one.series.unsigned)) for one in sessions)
+    if count:
+        total = sum(len(one.series) for one in sessions)
+        yield (f"{count} of {total} rows are summary lines, whose `max` has no sign: whether the "
+               "clock was early or late is not told (no median, TDEV or MTIE of such sessions), "
+               "and the values of an entry stand with either sign")  # fmt: skip
 
 
 def _outages(sessions: Sequence[ClockSession], gap_s: float) -> Iterator[str]:

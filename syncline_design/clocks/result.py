@@ -22,7 +22,7 @@ class SessionResult(Record):
     """One session; from and to: ISO 8601 in UTC, or seconds since boot where no date is known.
 
     counted: whether it is long enough; stationary None: too short to say.  median_s and quantile_s
-    None: no steady sample.
+    None: no steady sample; median_s too of offsets without a sign.
     """
 
     from_: str

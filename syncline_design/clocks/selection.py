@@ -96,7 +96,24 @@ def select(
         raise refused(first, "several kinds of logs that say different things of a clock",
                       found=", ".join(names), expected="logs of one kind",
                       hint="give those of one kind, or `timing --source NAME`")  # fmt: skip
+    if kind == "clock":
+        usable = _of_one_clock(usable, first)
     return _ranked(usable, series)
+
+
+def _of_one_clock(usable: Sequence[ClockSeries], first: Path) -> list[ClockSeries]:
+    """Of several clocks that phc2sys steers the host's own: others are no evidence of that."""
+    steered = list(dict.fromkeys(one.kind.name for one in usable if _is_steered(one)))
+    if SYSTEM not in steered and len(steered) > 1:
+        raise refused(first, "phc2sys steers several cards, and which clock is meant is not said",
+                      found=", ".join(steered), expected="one clock",
+                      hint="`timing --source NAME` takes one of them")  # fmt: skip
+    cards = [name for name in steered if name != SYSTEM and SYSTEM in steered]
+    return [one for one in usable if one.kind.name not in cards]
+
+
+def _is_steered(one: ClockSeries) -> bool:
+    return one.kind.name.startswith("phc2sys")
 
 
 def _is_serial(one: ClockSeries) -> bool:
@@ -276,7 +293,10 @@ def _pairs(
 
 
 def _sum(system: ClockSeries, card: ClockSeries) -> ClockSeries | None:
-    """Offsets and hard bounds added; in lock only where both are, and where the card was heard."""
+    """Offsets and hard bounds added; in lock only where both are, and where the card was heard.
+
+    Where either tells a size alone, sizes are added: signs that are not known may be the same.
+    """
     known = card.part(np.isfinite(card.offset_s))
     if len(known) < 2:
         return None
@@ -286,12 +306,15 @@ def _sum(system: ClockSeries, card: ClockSeries) -> ClockSeries | None:
     reach = max(10.0 * float(np.median(np.diff(known.time_s))), 1.0)
     kind = replace(system.kind, name=f"CLOCK_REALTIME by phc2sys and {card.kind.name}", rank=0,
                    steering=card.kind.steering, whole_way=card.kind.whole_way)  # fmt: skip
+    own, others = system.offset_s, np.interp(system.time_s, known.time_s, known.offset_s)
+    unsigned = system.unsigned | known.unsigned[after] | known.unsigned[after - 1]
     begin = np.zeros(len(system), dtype=bool)
     begin[:1] = True
     files = tuple(dict.fromkeys((*system.files, *card.files)))
     return replace(
         system, kind=kind, files=files, restart=begin, references=card.references,
         locked=system.locked & locked & (apart <= reach),
-        offset_s=system.offset_s + np.interp(system.time_s, known.time_s, known.offset_s),
+        offset_s=np.where(unsigned, np.abs(own) + np.abs(others), own + others),
+        unsigned=unsigned,
         hard_s=system.hard_s + np.interp(system.time_s, known.time_s, known.hard_s),
     )  # fmt: skip

@@ -29,7 +29,7 @@ class Row(NamedTuple):
     known.  rate: frequency against the reference [s/s].  skew: what that rate is uncertain by.
     restart: the daemon says that it begins anew.  opened: its log was opened anew before this
     line, which a start does (and no outage).  stratum: the clock's own.  combined: from how many
-    sources its time was made.
+    sources its time was made.  unsigned: offset_s is a size, the sign of which is not told.
     """
 
     time_s: float
@@ -42,6 +42,7 @@ class Row(NamedTuple):
     opened: bool = False
     stratum: float = math.nan
     combined: float = math.nan
+    unsigned: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +107,7 @@ class ClockSeries:
     opened: Flags
     stratum: Array
     combined: Array
+    unsigned: Flags
     references: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
@@ -116,7 +118,8 @@ class ClockSeries:
         return ClockSeries(
             self.kind, self.files, self.time_s[chosen], self.offset_s[chosen], self.hard_s[chosen],
             self.locked[chosen], self.rate[chosen], self.skew[chosen], self.restart[chosen],
-            self.opened[chosen], self.stratum[chosen], self.combined[chosen], self.references,
+            self.opened[chosen], self.stratum[chosen], self.combined[chosen],
+            self.unsigned[chosen], self.references,
         )  # fmt: skip
 
 
@@ -126,10 +129,9 @@ def series_of(
     """Rows of several files as columns."""
     table = np.concatenate([sheet.columns for sheet in sheets])
     references = frozenset[str]().union(*(sheet.references for sheet in sheets))
-    time_s, offset_s, hard_s, locked, rate, skew, restart, opened, stratum, combined = (
-        table.T.copy()
-    )
+    (time_s, offset_s, hard_s, locked, rate, skew, restart, opened, stratum, combined,
+     unsigned) = table.T.copy()  # fmt: skip
     return ClockSeries(
         kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5,
-        opened > 0.5, stratum, combined, references,
+        opened > 0.5, stratum, combined, unsigned > 0.5, references,
     )  # fmt: skip

@@ -81,6 +81,11 @@ class ClockSession:
         return self.series.offset_s[self.steady]
 
     @property
+    def is_signed(self) -> bool:
+        """Whether all offsets of the steady state have a sign."""
+        return not np.any(self.series.unsigned[self.steady])
+
+    @property
     def is_counted(self) -> bool:
         """Whether it is long enough to say anything."""
         return int(np.sum(self.steady)) >= LEAST_SAMPLES and self.duration_s >= SHORTEST_S

@@ -240,7 +240,7 @@ def _session(session: ClockSession, coverage: float) -> SessionResult:
     return SessionResult(
         from_=moment(begin, stamps), to=moment(end, stamps), samples=int(offsets.shape[0]),
         median_s=weighted_quantile(offsets, session.weight_s[session.steady], 0.5)
-        if some else None,
+        if some and session.is_signed else None,
         quantile_s=session.quantile_s(coverage) if some else None,
         duration_s=end - begin, counted=session.is_counted,
         hard_s=None if math.isnan(hard) else hard,
@@ -319,10 +319,11 @@ def _moved(session: ClockSession, after_s: float) -> float | None:
 
 
 def _stability(counted: Sequence[ClockSession]) -> tuple[StabilityPoint, ...]:
-    """TDEV and MTIE of the longest session."""
-    if not counted:
+    """TDEV and MTIE of the longest session whose offsets have a sign."""
+    signed = [s for s in counted if s.is_signed]
+    if not signed:
         return ()
-    longest = max(counted, key=lambda s: s.duration_s)
+    longest = max(signed, key=lambda s: s.duration_s)
     times = longest.series.time_s[longest.steady]
     step, grid = stability.on_a_grid(times, longest.offsets)
     points = []
@@ -351,10 +352,11 @@ def _trace(sessions: Sequence[ClockSession]) -> tuple[TracePoint, ...]:
 
 
 def _distribution(counted: Sequence[ClockSession]) -> Array:
-    """Quantiles of the offsets in lock, every session with the same weight."""
+    """Quantiles of the offsets in lock, every session with the same weight; sizes without a sign
+    stand with either."""
     if not counted:
         return np.zeros(0)
-    told = [s.told for s in counted]
+    told = [s.told if s.is_signed else _either_sign(*s.told) for s in counted]
     offsets = np.concatenate([one for one, _ in told])
     weights = np.concatenate([weight / np.sum(weight) for _, weight in told])
     order = np.argsort(offsets, kind="stable")
@@ -363,3 +365,7 @@ def _distribution(counted: Sequence[ClockSession]) -> Array:
     places = np.minimum(np.searchsorted(heaped, levels), offsets.shape[0] - 1)
     found: Array = offsets[order][places]
     return found
+
+
+def _either_sign(offsets: Array, weights: Array) -> tuple[Array, Array]:
+    return np.concatenate([offsets, -offsets]), np.concatenate([weights, weights])
