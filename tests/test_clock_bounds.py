@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from syncline_design.clocks.study import TimingSettings, study_logs
 from syncline_design.clocks.tolerance import (
     normal_factor,
+    range_factor,
     sessions_of_order_statistic,
     tolerance_bound,
 )
@@ -40,13 +42,38 @@ def _factor_by_chance(count: int, confidence: float) -> float:
     return float(np.quantile(k, confidence))
 
 
-def test_the_bound_of_symmetric_logarithms_is_the_log_normal_one() -> None:
-    half = np.array([0.05, 0.2, 0.35, 0.6, 0.9])
+def test_sessions_that_differ_by_orders_of_magnitude_are_bounded_by_their_logarithms() -> None:
+    half = 3.0 * np.array([0.05, 0.2, 0.35, 0.6, 0.9])
     logs = -11.0 + np.concatenate([half, -half])
     bound, method = tolerance_bound(np.exp(logs), 0.95, 0.95)
-    k = _factor_by_chance(10, 1.0 - 0.05 / 2.0)
-    assert method == "log-normal"
-    assert math.log(bound) == pytest.approx(-11.0 + k * logs.std(ddof=1), abs=0.02)
+    k = _factor_by_chance(10, 0.95)
+    assert method == "range"
+    assert math.log(bound) == pytest.approx(-11.0 + k * logs.std(ddof=1), abs=0.03)
+    ranged = np.exp(logs.max()) + range_factor(10, 0.95, 0.95) * np.ptp(np.exp(logs))
+    assert bound > ranged
+
+
+@pytest.mark.parametrize(
+    ("count", "share", "confidence"),
+    [(3, 0.95, 0.95), (5, 0.95, 0.95), (20, 0.95, 0.95), (58, 0.95, 0.95), (5, 0.9, 0.99),
+     (200, 0.99, 0.95)],
+)  # fmt: skip
+def test_the_range_bounds_a_heavy_tail_with_just_the_confidence(
+    count: int, share: float, confidence: float
+) -> None:
+    """(u^(-1/3) - 1) of even u is Pareto's with the tail of Student's t of 3 degrees of freedom; at
+    58 the largest alone holds in 94.9 %."""
+    studies = np.random.default_rng(2).random((20_000, count)) ** (-1.0 / 3.0) - 1.0
+    truth = (1.0 - share) ** (-1.0 / 3.0) - 1.0
+    largest = studies.max(axis=1)
+    bounds = largest + range_factor(count, share, confidence) * (largest - studies.min(axis=1))
+    away = math.sqrt(confidence * (1.0 - confidence) / 20_000)
+    assert float(np.mean(bounds >= truth)) == pytest.approx(confidence, abs=4.0 * away)
+
+
+@pytest.mark.parametrize("count", [59, 400])
+def test_from_as_many_sessions_on_as_the_largest_needs_the_range_adds_nothing(count: int) -> None:
+    assert range_factor(count, 0.95, 0.95) == 0.0
 
 
 def test_a_tiny_session_hardly_widens_the_bound_and_a_large_one_does() -> None:
@@ -77,7 +104,7 @@ def test_the_largest_session_carries_it_from_59_on() -> None:
     many = np.exp(source.normal(-11.0, 0.4, 59))
     many[7] = 3.0 * many.max()
     assert tolerance_bound(many, 0.95, 0.95) == (float(many.max()), "order statistic")
-    assert tolerance_bound(many[:58], 0.95, 0.95)[1] == "log-normal"
+    assert tolerance_bound(many[:58], 0.95, 0.95)[1] == "range"
 
 
 @pytest.mark.parametrize("count", [3, 5, 20, 60])
@@ -95,7 +122,7 @@ def test_the_claim_holds_for_sessions_that_are_heavier_than_log_normal(count: in
     """Logs of skewness 0.4, as flicker noise makes them; 400 studies: the lower 95 % limit of the
     share that holds is above 88 % (5 sessions) or 92 %.
 
-    The true shares are 95 to 98 %: another seed would fail once in a hundred.
+    The true shares are 98 % and more.  Widths are asked for from 20 sessions on; of 5 it is stated.
     """
     source = np.random.default_rng(17)
     truth = math.exp(0.04 * 33.75)  # chi2.ppf(0.95, 50) / 2 = 33.752
@@ -105,4 +132,40 @@ def test_the_claim_holds_for_sessions_that_are_heavier_than_log_normal(count: in
     share = held / 400
     low = share - 1.96 * math.sqrt(share * (1.0 - share) / 400)
     assert low > (0.88 if count == 5 else 0.92), share
-    assert np.median(bounds) / truth < {5: 2.5, 20: 1.6, 60: 1.5}[count]
+    assert np.median(bounds) / truth < {5: 3.0, 20: 1.6, 60: 1.5}[count]
+
+
+def _of_bias(
+    bias: Callable[[np.random.Generator, int], np.ndarray], source: np.random.Generator, count: int
+) -> np.ndarray:
+    """What sessions of 240 samples keep to for 95 %: white noise of 1 about a new bias each."""
+    noise = source.normal(size=(count, 240))
+    figures: np.ndarray = np.quantile(np.abs(bias(source, count)[:, None] + noise), 0.95, axis=1)
+    return figures
+
+
+@pytest.mark.parametrize("count", [5, 7, 20, 40])
+@pytest.mark.parametrize(
+    "bias",
+    [
+        lambda source, count: source.normal(0.0, 0.6, count),
+        lambda source, count: source.laplace(0.0, 0.45, count),
+        lambda source, count: 0.4 * source.standard_t(3, count),
+        lambda source, count: source.exponential(0.5, count),
+    ],
+    ids=["normal", "Laplace", "Student t3", "one-sided"],
+)
+def test_the_claim_holds_for_biases_as_large_as_the_noise(
+    bias: Callable[[np.random.Generator, int], np.ndarray], count: int
+) -> None:
+    """A floor of noise, and beyond it what some starts bring: 1000 studies, lower 95 % limit.
+
+    The true shares are 95 % and more; a log-normal bound holds in 74 to 90 %.
+    """
+    source = np.random.default_rng(23)
+    truth = float(np.quantile(_of_bias(bias, source, 40_000), 0.95))
+    studies = _of_bias(bias, source, 1000 * count).reshape(1000, count)
+    bounds = np.array([tolerance_bound(q, 0.95, 0.95)[0] for q in studies])
+    share = float(np.mean(bounds >= truth))
+    assert share - 1.96 * math.sqrt(share * (1.0 - share) / 1000) > 0.92, share
+    assert np.median(bounds) / truth < {5: 3.0, 7: 2.5, 20: 1.8, 40: 1.5}[count]

@@ -10,9 +10,11 @@ import numpy as np
 
 from syncline_design.clocks.series import Array
 
-Method = Literal["log-normal", "order statistic"]
+Method = Literal["range", "order statistic"]
 LEFT_SKEWED: Final = -0.5
-LEAST_SESSIONS: Final = 3  # from two the bound holds too, thousands of times too wide
+LEAST_SESSIONS: Final = 3  # from two the bound holds too, hundreds of times too wide
+TAIL_INDEX: Final = 1.0 / 3.0  # of Student's t of three degrees of freedom
+_CELLS: Final = 4000  # of an integral over probability
 
 
 def sessions_of_order_statistic(share: float, confidence: float) -> int:
@@ -46,6 +48,42 @@ def normal_factor(count: int, share: float, confidence: float) -> float:
     return float(nct.ppf(confidence, count - 1, float(ndtri(share)) * root)) / root
 
 
+@cache
+def range_factor(count: int, share: float, confidence: float) -> float:
+    """c of largest + c (largest - smallest), a tolerance bound of values with a heavy tail [1].
+
+    Of the generalised Pareto distribution with the tail index 1/3,
+    F(x) = 1 - (1 + x / 3)^-3 (Pickands 1975), whatever its level and its unit.  With the largest
+    at its probability u, the others lie below it at random, so that the bound misses the quantile
+    q of `share` with the chance n integral of max(u - F(m(u)), 0)^(n-1) over u from 0 to share,
+    m = x(u) - (q - x(u)) / c.  Summed over v = (u / share)^n.  0 where the largest alone is a
+    bound.
+    """
+    from scipy.optimize import brentq
+
+    if count >= sessions_of_order_statistic(share, confidence):
+        return 0.0
+    places = share * ((np.arange(_CELLS) + 0.5) / _CELLS) ** (1.0 / count)
+    values, sought = _pareto_quantile(places), float(_pareto_quantile(np.array(share)))
+
+    def miss(factor: float) -> float:
+        least = _pareto_share(np.maximum(values - (sought - values) / factor, 0.0))
+        between = np.maximum(1.0 - least / places, 0.0)
+        return float(share**count * np.mean(between ** (count - 1)))
+
+    return float(brentq(lambda factor: miss(factor) - (1.0 - confidence), 1e-9, 1e9))
+
+
+def _pareto_quantile(share: Array) -> Array:
+    found: Array = np.expm1(-TAIL_INDEX * np.log1p(-share)) / TAIL_INDEX
+    return found
+
+
+def _pareto_share(value: Array) -> Array:
+    found: Array = -np.expm1(-np.log1p(TAIL_INDEX * value) / TAIL_INDEX)
+    return found
+
+
 def tolerance_bound(
     quantiles: Array, share: float, confidence: float, effective: float = math.inf
 ) -> tuple[float, Method]:
@@ -53,50 +91,34 @@ def tolerance_bound(
 
     effective: as many independent sessions as these say as much as, where they are not.
 
-    The larger of the largest session, which alone is a bound from as many sessions on as the order
-    statistic needs, and of a tolerance bound that takes a transform of the quantiles as normal.
+    What a session keeps to is a floor of noise and, beyond it, what its start brought: skewed to
+    the right further than a log-normal value.  So the larger is taken of what the range of these
+    sessions says of a heavy tail, and of what their logarithms say, where sessions differ by
+    orders of magnitude.
     """
     largest = float(np.max(quantiles))
     count = max(2, math.floor(min(quantiles.shape[0], effective)))
     enough = count >= sessions_of_order_statistic(share, confidence)
-    method: Method = "order statistic" if enough else "log-normal"
+    method: Method = "order statistic" if enough else "range"
     positive = quantiles[quantiles > 0.0]
     if quantiles.shape[0] < 2 or not positive.shape[0]:
         return largest, method
-    k = normal_factor(count, share, raised_confidence(count, confidence))
-    return max(largest, _raised(np.maximum(quantiles, float(np.min(positive))), k)), method
+    apart = largest - float(np.min(quantiles))
+    ranged = largest + range_factor(count, share, confidence) * apart
+    logs = np.log(np.maximum(quantiles, float(np.min(positive))))
+    return max(ranged, _log_normal(logs, normal_factor(count, share, confidence))), method
 
 
-def raised_confidence(count: int, confidence: float) -> float:
-    """The confidence of the transformed part: sessions are of its shape only about.
-
-    The more sessions there are, the less of a miss is due to their number and the more to their
-    shape: of what may be missed 2/3 is taken at 5 sessions, 1/3 from 20 on.  Measured on clocks of
-    six kinds (benchmarks/timing.py): without it flicker noise holds in 88 % at 20 sessions.
-    """
-    return 1.0 - (1.0 - confidence) / (1.0 + min(count / 10.0, 2.0))
-
-
-def _raised(quantiles: Array, k: float) -> float:
-    """The larger bound of log-normal and of cube-root-normal quantiles.
+def _log_normal(logs: Array, k: float) -> float:
+    """exp(mean + k s) of logarithms of sessions' quantiles; 0 where they are not log-normal.
 
     Small sessions say nothing about large ones: logarithms further below the median than the
     largest is above it count as if they were not.  Where many sessions are much smaller than the
-    rest (skewness of the logarithms below -0.5) they are not log-normal: the cube root alone
-    counts, which makes squares of normal values nearly normal (Wilson and Hilferty 1931).
+    rest (skewness of the logarithms below -0.5) they are of another shape.
     """
-    logs = np.log(quantiles)
-    cubic = max(0.0, _mean_plus(np.cbrt(quantiles), k)) ** 3
     away = logs - np.mean(logs)
     spread = float(np.mean(away**2))
     if spread == 0.0 or float(np.mean(away**3)) < LEFT_SKEWED * spread**1.5:
-        return cubic
-    low = 2.0 * float(np.median(logs)) - float(np.max(logs))
-    return max(cubic, math.exp(min(_mean_plus(np.maximum(logs, low), k), 700.0)))
-
-
-def _mean_plus(values: Array, k: float) -> float:
-    """mean + k s; s: standard deviation, or that of the upper side where this is the wider one."""
-    away = values - np.mean(values)
-    upper = 2.0 * float(np.sum(away[away > 0.0] ** 2)) / (values.shape[0] - 1)
-    return float(np.mean(values)) + k * math.sqrt(max(float(np.var(values, ddof=1)), upper))
+        return 0.0
+    raised = np.maximum(logs, 2.0 * float(np.median(logs)) - float(np.max(logs)))
+    return math.exp(min(float(np.mean(raised)) + k * float(np.std(raised, ddof=1)), 700.0))

@@ -50,7 +50,7 @@ _RESTS: Final = {
     "unknown_and_declared": "offsets as given, and what was declared beside",
 }
 _METHODS: Final = {
-    "log-normal": "a tolerance bound over sessions, never below the largest",
+    "range": "a tolerance bound over sessions: the largest, and beyond it as their range tells",
     "order statistic": "the largest session (order statistic), or what raises it",
 }
 
@@ -187,7 +187,7 @@ def _claim(result: Timing) -> list[Node]:
     if result.conditions:
         facts.append(("Conditions", given(result.conditions)))
     nodes: list[Node] = [Facts(tuple(facts), "record")]
-    if claim.made and claim.method == "log-normal":
+    if claim.made and claim.method == "range":
         nodes.append(Text(_unseen(claim), quiet=True))
     if not claim.made:
         said = f"No claim: {claim.why_not}." if claim.why_not else "No claim."
