@@ -78,6 +78,28 @@ def test_clock_logs_against_the_clock_of_the_spec(
     assert {one["read_as"] for one in result["evidence"]} == {"clock"}
 
 
+@pytest.mark.parametrize("good", [0, 1, 19, 200])
+@pytest.mark.parametrize("kind", ["tracking", "ptp4l"])
+def test_a_session_beyond_the_bound_is_broken_however_many_good_ones_lie_beside_it(
+    clocked: Path, good: int, kind: str
+) -> None:
+    """0.3 us in some files of a daemon and 10 ms in one: its format has one unit, and no file of it
+    is in another."""
+    rng = np.random.default_rng(2)
+    logs = []
+    for day, mean_s in enumerate([*[0.0] * good, 1e-2]):
+        times = 1.8e9 + 86400.0 * day + 64.0 * np.arange(120)
+        off = mean_s + 3e-7 * rng.standard_normal(120)
+        lines = (tracking(times, -off, hard_s=1.2e-2) if kind == "tracking"
+                 else [ptp4l_line(t, -x) for t, x in zip(times, off, strict=True)])  # fmt: skip
+        logs.append(write(clocked.parent / f"{day}.log", lines))
+    found = accept(load(clocked), logs, AcceptSettings(("clock",)), seed=0)
+    (row,) = found.assumptions
+    assert (row.status, found.exit_code) == ("broken", 1), row
+    assert row.measured is not None
+    assert row.measured.value == pytest.approx(1e-2, rel=0.3)
+
+
 @pytest.mark.parametrize(
     ("sigma_s", "sessions", "timeline", "status", "words"),
     [

@@ -124,8 +124,8 @@ def _levels(sessions: Sequence[ClockSession]) -> Iterator[str]:
 def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
     """Sessions whose levels stand a thousand apart, with nothing between.
 
-    Within one table a bad start moves the level of a session alone, another unit its scatter too;
-    the format of a daemon fixes its unit for the whole file.
+    Within one table a bad start moves the level of a session alone, another unit its scatter too.
+    The format of a daemon fixes its unit: between two of its files nothing is mixed up.
     """
     levels = [(float(np.median(np.abs(s.offsets))), s) for s in sessions if s.is_counted]
     levels = sorted((level for level in levels if level[0] > 0.0), key=lambda level: level[0])
@@ -134,7 +134,8 @@ def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
         above = [level for level, _ in levels if level >= high]
         ratio = float(np.median(above)) / float(np.median(below))
         apart = small.series.files != large.series.files
-        if high <= 100.0 * low or not _is_unit(ratio):
+        tables = [s for s in (small, large) if s.series.kind.family == "csv"]
+        if high <= 100.0 * low or not tables or not _is_unit(ratio):
             continue
         if apart:
             yield (f"offsets in {large.series.files[0]} are {to_digits(ratio, 3)} times those in "

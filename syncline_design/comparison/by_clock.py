@@ -44,11 +44,16 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
     found = study.timing
     if found.doubts:
         return Judgement("not_shown", f"the clock logs are in doubt: {found.doubts[0]}")
+    seen = seen_s(found)
+    if one.value is not None and seen > max(one.value, found.bound_s or 0.0):
+        off, asked = format_duration(seen), format_duration(one.value)
+        said = f"a session was {off} off, more than the {asked} assumed"
+        return Judgement("broken", said, MeasuredFigure(seen, seen, seen))
     if found.bound_s is None or one.value is None:
         return Judgement("not_shown", f"the clock logs bound nothing: {found.claim.why_not}")
-    figure = MeasuredFigure(found.bound_s, min(seen_s(found), found.bound_s), found.bound_s)
+    figure = MeasuredFigure(found.bound_s, min(seen, found.bound_s), found.bound_s)
     asked, measured = format_duration(one.value), format_duration(found.bound_s)
-    if found.bound_s > one.value and seen_s(found) <= one.value:
+    if found.bound_s > one.value and seen <= one.value:
         said = f"measured bound {measured}, more than the {asked} assumed, but no session was "
         return Judgement("not_shown", f"{said}{_not_beyond(one.value, found)}", figure)
     if found.bound_s > one.value:

@@ -79,7 +79,7 @@ class InStretches:
         if own and s.sure and alone:
             part = of_stretch(s)
             matters = "would turn the verdict" if turns else _AS_LARGE
-            words = f"{part.words} stands out {place}, and {matters}{_built_in(s)}"
+            words = f"{_found(s)} {place}, and {matters}{_built_in(s)}"
             return Judgement("broken", words, figure_of(one, part.parameters), s.from_s, s.to_s)
         if s.sure and s.noise_of:
             whose = " or ".join(s.noise_of)
@@ -214,6 +214,14 @@ def _sizes(lengths: Sequence[float], worst: Sequence[ShownSize], at: int) -> Ite
         size, lasts = worst[k].sizes[k], format_duration(rounded(lengths[k], 2))
         if math.isfinite(size):
             yield f"in {lasts} from {amount(size, worst[k].unit)} on"
+
+
+def _found(s: Stands) -> str:
+    """What is there, in words that its place follows."""
+    if s.frozen:
+        oldest = format_duration(rounded(s.values[0], 3))
+        return f"{s.label[1]} repeats one reading, in the end {oldest} old,"
+    return f"{of_stretch(s).words} stands out"
 
 
 def _in_its_place(s: Stands) -> list[OtherFit]:

@@ -1,11 +1,13 @@
 """The diagnosis of a built system: the log in whole, in stretches, and what it leaves open.
 
 What stands out in a stretch is taken out, and the rest is diagnosed anew: a second of faulty rows
-would be noise of all of them.
+would be noise of all of them.  Rows that repeat a reading are taken out before: their delay grows
+with every one of them, which no constant fits.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
@@ -13,18 +15,22 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.diagnosis.fitting import Model
+from syncline_design.diagnosis.consequence import expected_rms_m
+from syncline_design.diagnosis.fitting import Data, Model
+from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.instead import InItsPlace, in_place
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
 from syncline_design.diagnosis.noise_split import NoiseFactors, factors
 from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import SearchedLog, examined, told
+from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.stretches import Stands, Stretches, left_as_one, stretches
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
+from syncline_design.effects import plain_delay
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -69,8 +75,9 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
         inputs = measured(case, paths)
         one = examined(inputs, settings)
         beyond = beyond_limits(one.data.view)
-        seen, taken = _seen(one), []
-        for _ in range(ROUNDS):
+        held, taken = _held(inputs, one.data), list[Stands]()
+        seen = Stretches(held) if held else _seen(one)
+        for _ in range(ROUNDS + bool(held)):
             sure = [s for s in seen.stands if s.sure]
             less = _less(one.inputs, sure, (1.0 - MOST_TAKEN) * len(inputs.log))
             if less is None:
@@ -94,6 +101,22 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             left_as_one(one.data, model, one.search.signatures),
             1.0 - len(one.inputs.log) / len(inputs.log),
         )
+
+
+def _held(inputs: Measured, data: Data) -> tuple[Stands, ...]:
+    """Rows of a log that repeat a reading while the vehicle moves on, as delays by their age."""
+    view = scene(inputs.system, inputs.log, inputs.known)
+    time_s, delay = inputs.log.time_s, plain_delay()
+    usual_m = max(expected_rms_m(data), 1e-300)
+    return tuple(
+        Stands(
+            (delay.name, each.sensor, each.stage), inputs.system.stages[each.stage].name,
+            float(time_s[each.first]), float(time_s[each.last]), (delay.parameters[0].name,),
+            (each.age_s,), (0.0,), -math.inf, True, inside=True, frozen=True,
+            share=math.sqrt(float(np.sum(each.off_m**2)) / len(time_s)) / usual_m,
+        )
+        for each in frozen(view)
+    )  # fmt: skip
 
 
 def _seen(one: SearchedLog) -> Stretches:

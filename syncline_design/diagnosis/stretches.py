@@ -23,22 +23,19 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, zero_values
+from syncline_design.diagnosis.candidates import Candidate, Signature, commonness
 from syncline_design.diagnosis.consequence import expected_rms_m, rms_m
-from syncline_design.diagnosis.covariance import Precision
-from syncline_design.diagnosis.fitting import Data, Model, adjusted
+from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import (
-    NoiseLevel,
-    Structure,
-    as_specified,
     precision,
     white_covariance,
 )
 from syncline_design.diagnosis.noise_instead import noise_instead
 from syncline_design.diagnosis.one_course import OneCourse, one_course
 from syncline_design.diagnosis.scores import clean_errors
-from syncline_design.diagnosis.spans import StampSpan, cut_to, cuttable
+from syncline_design.diagnosis.spans import cuttable
 from syncline_design.diagnosis.stretch_ends import ends
+from syncline_design.diagnosis.stretch_fits import Fit, Hit, as_good, as_loud, fitted, made
 from syncline_design.diagnosis.stretch_windows import (
     ALONE,
     DOUBT,
@@ -49,7 +46,6 @@ from syncline_design.diagnosis.stretch_windows import (
     cumulated,
     scanned,
 )
-from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.random_numbers import generator
@@ -61,7 +57,6 @@ DRAWS: Final = 6  # logs drawn from the fitted noise
 STREAM: Final = 23  # key of their draws
 SURE: Final = 1e-4  # chance that a sound log has such a window, below which it acts there
 NEARLY_ALL_PLACES: Final = 0.05  # of the windows show less than is told
-AS_GOOD_NATS: Final = 4.5  # within which candidates of a window are not told apart
 ENDS_ROUNDS: Final = 2  # of fitting it and finding its ends: a window of wrong ends fits less of it
 EDGE: Final = 0.02  # of a log, within which what stands out may go on beyond its end
 ASKED: Final = ("latency", "lever_arm", "mounting")  # kinds of assumptions
@@ -77,6 +72,7 @@ class Stands:
     whether it begins and ends within the log, as what is built in does not.  margin_s: by which its
     ends may be off.  share: RMS that it makes in the log, over what the spec's noise makes.
     noise_of: the sensors whose slow noise does there as well; none of a constant beyond doubt.
+    frozen: whether it is one reading that is given over and over, of which the value is the age.
     """
 
     label: Label
@@ -93,6 +89,7 @@ class Stands:
     margin_s: float = 0.0
     share: float = 0.0
     noise_of: tuple[str, ...] = ()
+    frozen: bool = False
 
     @property
     def others(self) -> tuple[Label, ...]:
@@ -135,29 +132,6 @@ class Stretches:
     reaches: tuple[ShownSize, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Hit:
-    """A window in which something stands out, and the noise at its length."""
-
-    from_s: float
-    to_s: float
-    log_p: float
-    scale2: float
-    signature: Signature
-    margin_s: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    """A candidate fitted in a window: nat saved with its figures paid for, and without."""
-
-    signature: Signature
-    nats: float
-    saved: float
-    values: tuple[float, ...]
-    spreads: tuple[float, ...]
-
-
 def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -> Stretches:
     """Every candidate of a settled model's log in every window."""
     asked = [s for s in found if _asked(s)]
@@ -165,7 +139,7 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -
         return Stretches()
     rng = generator([seed, STREAM])
     whitened = _whitened(data, clean_errors(data, model, rng, DRAWS), model)
-    hits: list[_Hit] = []
+    hits: list[Hit] = []
     reaches: list[ShownSize] = []
     for s in asked:
         sums = _summed(data, whitened, s)
@@ -208,17 +182,12 @@ def _asked(s: Signature) -> bool:
     return s.plain and effect.asked_in_stretches and cuttable(effect)
 
 
-def _as_loud(structure: Structure, model: Model) -> NoiseLevel:
-    """The spec's white noise, larger where the log has episodes of it, and along the motion."""
-    return replace(as_specified(structure), episodes=True, size=model.level.size)
-
-
 def _whitened(data: Data, drawn: Array, model: Model) -> tuple[Array, Array]:
     """Root of W (n, 3, 3), zero where nothing is compared; the whitened remainder and drawn ones
     (1 + draws, n, 3)."""
     axes = np.isin(np.arange(3), list(data.axes))
     known = np.isfinite(data.view.log.truth_m) & axes
-    covariance = white_covariance(data.structure, _as_loud(data.structure, model))
+    covariance = white_covariance(data.structure, as_loud(data.structure, model))
     hidden = ~known
     covariance = np.where(hidden[:, :, None] | hidden[:, None, :], 0.0, covariance)
     covariance += np.eye(3) * hidden[:, None, :]
@@ -243,7 +212,7 @@ def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> BlockSum
     return BlockSums(normal, score, square, rows, edges, data.view.log.time_s)
 
 
-def _hits(s: Signature, sums: BlockSums, windows: Sequence[Windows]) -> Iterator[_Hit]:
+def _hits(s: Signature, sums: BlockSums, windows: Sequence[Windows]) -> Iterator[Hit]:
     """The window in which a candidate is clearest, if that is at least a doubt."""
     least = min((float(np.min(one.log_p)) for one in windows), default=0.0)
     if least >= math.log(DOUBT):
@@ -254,11 +223,11 @@ def _hits(s: Signature, sums: BlockSums, windows: Sequence[Windows]) -> Iterator
     at = int(np.argmin(where))
     first, last = sums.first[at], sums.first[at + best.length] - 1
     times = float(sums.time_s[first]), float(sums.time_s[last])
-    yield _Hit(*times, float(best.log_p[at]), best.scale2, s)
+    yield Hit(*times, float(best.log_p[at]), best.scale2, s)
 
 
 def _stands(
-    data: Data, model: Model, asked: Sequence[Signature], hits: Sequence[_Hit]
+    data: Data, model: Model, asked: Sequence[Signature], hits: Sequence[Hit]
 ) -> Iterator[tuple[Stands, float]]:
     """The clearest window, named, with its length's noise; then that elsewhere, and so on."""
     left = sorted(hits, key=lambda one: one.log_p)
@@ -272,46 +241,36 @@ def _stands(
         left = [one for one in left if one.to_s < best.from_s or best.to_s < one.from_s]
 
 
-def _named(data: Data, model: Model, asked: Sequence[Signature], hit: _Hit) -> Stands | None:
+def _named(data: Data, model: Model, asked: Sequence[Signature], hit: Hit) -> Stands | None:
     """What fits a window best by re-simulation, and what fits it as well.
 
-    Each figure costs half of log N nat.  Of those within AS_GOOD_NATS the commonest is named,
-    what comes and goes before what is built in.  What breaks another row needs not pay: that it has
-    more figures is no proof against it (a turn of the attitude that looks like an azimuth).
+    Of those that are as good the commonest is named, what comes and goes before what is built in.
     """
-    white = precision(data.structure, _as_loud(data.structure, model))
-    tried = (_fitted(data, model, white, s, hit) for s in asked)
+    white = precision(data.structure, as_loud(data.structure, model))
+    tried = (fitted(data, model, white, s, hit) for s in asked)
     fits = [each for each in tried if each is not None]
     if not fits:
         return None
-    best = max(fits, key=lambda each: each.nats)
-    row = _row(best.signature.candidate)
-    as_good = [
-        each
-        for each in fits
-        if each.nats > best.nats - AS_GOOD_NATS
-        or (_row(each.signature.candidate) != row and each.saved > best.saved - AS_GOOD_NATS)
-    ]
-    named = min(as_good, key=lambda each: _seldom(each.signature.candidate))
+    inside = is_inside(hit.from_s, hit.to_s, data.view.log.ends_s)
+    good = as_good(fits, inside=inside)
+    named = min(good, key=lambda each: _seldom(each.signature.candidate))
     own = _told(data, named)
-    others = tuple(_told(data, other) for other in as_good if other is not named)
+    others = tuple(_told(data, other) for other in good if other is not named)
     return Stands(
         own.label, own.stage, hit.from_s, hit.to_s, own.parameters, own.values, own.spreads,
-        hit.log_p, hit.log_p < math.log(SURE), others,
-        is_inside(hit.from_s, hit.to_s, data.view.log.ends_s), hit.margin_s,
-        _share(data, model, named, hit),
+        hit.log_p, hit.log_p < math.log(SURE), others, inside, hit.margin_s,
+        _share(model, named, hit),
     )  # fmt: skip
 
 
-def _to_the_row(data: Data, model: Model, hit: _Hit) -> _Hit:
+def _to_the_row(data: Data, model: Model, hit: Hit) -> Hit:
     """The window with the ends of what acts there, by the candidate that it is clearest in."""
-    found = _fitted(data, model, precision(data.structure, _as_loud(data.structure, model)),
+    found = fitted(data, model, precision(data.structure, as_loud(data.structure, model)),
                     hit.signature, hit)  # fmt: skip
     if found is None:
         return hit
     time_s = data.view.log.time_s
-    made = _made(data, model, found)
-    _, (left, moved) = _whitened(data, made[None], model)
+    _, (left, moved) = _whitened(data, made(model, found)[None], model)
     told = np.sum(moved**2, axis=1) / max(hit.scale2, 1.0)
     saved = np.sum(moved * left, axis=1) / max(hit.scale2, 1.0) - 0.5 * told
     rows = np.flatnonzero((time_s >= hit.from_s) & (time_s <= hit.to_s))
@@ -321,17 +280,10 @@ def _to_the_row(data: Data, model: Model, hit: _Hit) -> _Hit:
     return replace(hit, from_s=first_s, to_s=last_s, margin_s=usual_s * own.margin)
 
 
-def _made(data: Data, model: Model, fit: _Fit) -> Array:
-    """What a candidate would do to every row if it acted there (n, 3) [m]."""
-    one = fit.signature.candidate
-    values = {p.name: v for p, v in zip(one.effect.slopes(), fit.values, strict=True)}
-    whole = Acting(one.effect, one.sensor, one.stage, {**zero_values(one.effect), **values})
-    return data.error(model.acting) - data.error((*model.acting, whole))
-
-
-def _share(data: Data, model: Model, fit: _Fit, hit: _Hit) -> float:
+def _share(model: Model, fit: Fit, hit: Hit) -> float:
+    data = fit.data
     inside = (data.view.log.time_s >= hit.from_s) & (data.view.log.time_s <= hit.to_s)
-    made_m = rms_m(data, _made(data, model, fit) * inside[:, None])
+    made_m = rms_m(data, made(model, fit) * inside[:, None])
     return made_m / max(expected_rms_m(data), 1e-300)
 
 
@@ -342,12 +294,7 @@ def is_inside(from_s: float, to_s: float, ends_s: tuple[float, float]) -> bool:
     return from_s - first > margin_s and last - to_s > margin_s
 
 
-def _row(one: Candidate) -> tuple[str, str, int]:
-    """What it breaks, of which sensor."""
-    return one.effect.breaks, one.sensor, one.stage
-
-
-def _told(data: Data, fit: _Fit) -> OtherFit:
+def _told(data: Data, fit: Fit) -> OtherFit:
     one = fit.signature.candidate
     return OtherFit(
         one.label, data.view.system.stages[one.stage].name,
@@ -357,27 +304,6 @@ def _told(data: Data, fit: _Fit) -> OtherFit:
 
 def _seldom(one: Candidate) -> tuple[bool, int, int]:
     return not one.effect.passing, *commonness(one.label)
-
-
-def _fitted(data: Data, model: Model, white: Precision, s: Signature, hit: _Hit) -> _Fit | None:
-    """One candidate in a window beside the model's effects, in the spec's white noise."""
-    view = data.view
-    cut = cut_to(StampSpan(s.candidate.effect, hit.from_s, hit.to_s), s, view.log.time_s)
-    own = Acting(cut.candidate.effect, s.candidate.sensor, s.candidate.stage,
-                 zero_values(s.candidate.effect))  # fmt: skip
-    before = model.error
-    acting, after, covariance = adjusted(data, (*model.acting, own), white, before, steps=6)
-    slopes = s.candidate.effect.slopes()
-    values = tuple(float(acting[-1].values[p.name]) for p in slopes)
-    if any(abs(v) > p.high for v, p in zip(values, slopes, strict=True)):
-        return None
-    inside = (view.log.time_s >= hit.from_s) & (view.log.time_s <= hit.to_s)
-    scale2 = max(hit.scale2, 1.0)
-    rows = 3.0 * float(np.sum(inside))
-    saved = white.negative_log_likelihood(before) - white.negative_log_likelihood(after)
-    spreads = np.sqrt(scale2 * np.maximum(np.diag(covariance)[-len(slopes) :], 0.0))
-    nats = saved / scale2 - 0.5 * len(slopes) * math.log(rows)
-    return _Fit(s, nats, saved / scale2, values, tuple(map(float, spreads)))
 
 
 def _usual_gap_s(time_s: Array) -> float:

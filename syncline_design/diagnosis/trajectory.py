@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.recent import Recent
-from syncline_design.effects.record import Array
+from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.logs.smoothing import LEAST_SMOOTHED, MOST_TRIED, Smoothing, penalty
 from syncline_design.logs.stamps import per_stamp
@@ -184,6 +184,13 @@ class LoggedMotion:
     def at(self, time_s: Array) -> LoggedMotion:
         """The same motion, asked about at other stamps."""
         return replace(self, time_s=time_s, recent=Recent(SHIFTS))
+
+    def keeping_time(self, sensor: ActsOn) -> LoggedMotion:
+        """The same motion, its columns not as late as the poses of a sensor are."""
+        own = replace(self, recent=Recent(SHIFTS))
+        if sensor == "position":
+            return replace(own, follows_position=False)
+        return replace(own, follows_attitude=False)
 
     def displacement(self, from_s: Array, to_s: Array, position_shift_s: Array) -> Array:
         """p(to) - p(from) [m], NED, (n, 3)."""

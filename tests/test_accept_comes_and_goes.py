@@ -1,0 +1,110 @@
+"""`accept` on what comes and goes: delays of any size for a while, and devices that hang."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.comparison.accept import AcceptSettings, accept
+from syncline_design.diagnosis.frozen import frozen
+from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.system import measured
+from syncline_design.logs.log import Log
+from syncline_design.model.system import System
+from syncline_design.spec.load import load
+from tests.test_accept_stretches import fastest_s, files, late, world
+
+
+def held(log: Path, columns: Sequence[str], from_s: float, to_s: float) -> Path:
+    """The log with what a device gave last before a time given over and over until another."""
+    lines = [line.split(",") for line in log.read_text("utf-8").splitlines()]
+    at = [lines[0].index(name) for name in columns]
+    first = float(lines[1][0])
+    rows = [k for k in range(1, len(lines)) if from_s < float(lines[k][0]) - first < to_s]
+    for k in rows:
+        for column in at:
+            lines[k][column] = lines[rows[0] - 1][column]
+    log.write_text("\n".join(",".join(line) for line in lines) + "\n", "utf-8")
+    return log
+
+
+PLACES = tuple(f"position_{axis}_m" for axis in ("north", "east", "down"))
+ANGLES = ("roll_deg", "pitch_deg", "yaw_deg")
+
+
+@pytest.mark.parametrize(
+    ("columns", "role", "lasts_s"),
+    [(PLACES, "position", 1.3), (PLACES, "position", 10.0), (ANGLES, "attitude", 5.0)],
+)
+def test_a_device_that_repeats_its_last_reading_breaks_its_latency(
+    columns: Sequence[str], role: str, lasts_s: float, tmp_path: Path
+) -> None:
+    """Its data are as old as the run is long, which no constant delay nor arm fits."""
+    run = world("fixed_wing_circuits", 2)
+    spec, log = files(tmp_path, run)
+    from_s = fastest_s(run)
+    told = accept(load(spec), [held(log, columns, from_s, from_s + lasts_s)],
+                  AcceptSettings(("latency", "lever_arm", "mounting")), seed=0)  # fmt: skip
+    rows = {(row.role, row.assumption): row for row in told.assumptions}
+    row = rows[role, "latency"]
+    assert row.status == "broken", row
+    assert row.measured is not None
+    assert row.measured.value == pytest.approx(lasts_s, abs=0.25)
+    assert "repeats one reading" in row.evidence
+    assert row.from_s == pytest.approx(from_s, abs=0.25)
+    assert row.to_s == pytest.approx(from_s + lasts_s, abs=0.25)
+    assert [key for key, one in rows.items() if one.status == "broken"] == [(role, "latency")]
+    assert told.groups == ()
+
+
+def test_readings_that_are_held_all_along_or_on_a_vehicle_that_rests_are_none(
+    tmp_path: Path,
+) -> None:
+    """A log at five times the rate of its receiver, and one of a receiver that holds its place."""
+    run = world("fixed_wing_circuits", 2)
+    spec, log = files(tmp_path, run)
+    seen = scene(*_of(spec, log))
+    assert frozen(seen) == []
+    first = seen.log.stages[0]
+    assert first.antenna_m is not None
+    every = np.arange(len(seen)) // 5 * 5
+    slower = replace(first, antenna_m=first.antenna_m[every])
+    assert frozen(scene(seen.system, replace(seen.log, stages=(slower,)))) == []
+    rests = replace(first, antenna_m=np.where(np.arange(len(seen))[:, None] < 50,
+                                              first.antenna_m[:1], first.antenna_m),
+                    velocity_mps=np.where(np.arange(len(seen))[:, None] < 50, 0.0,
+                                          first.velocity_mps))  # fmt: skip
+    assert frozen(scene(seen.system, replace(seen.log, stages=(rests,)))) == []
+    hangs = replace(rests, velocity_mps=first.velocity_mps)
+    (one,) = frozen(scene(seen.system, replace(seen.log, stages=(hangs,))))
+    assert (one.sensor, one.first, one.last) == ("position", 1, 49)
+
+
+def _of(spec: Path, log: Path) -> tuple[System, Log]:
+    inputs = measured(load(spec), [log])
+    return inputs.system, inputs.log
+
+
+@pytest.mark.parametrize(("size_s", "lasts_s"), [(0.2, 1.5), (0.5, 8.0)])
+def test_a_large_delay_for_a_while_is_sized_and_no_arm(
+    size_s: float, lasts_s: float, tmp_path: Path
+) -> None:
+    """Velocities keep their stamps meanwhile, though in all of the log they share the places'."""
+    run = world("multirotor_lines", 5, 50.0, 4.0)
+    from_s = fastest_s(run)
+    spec, log = files(tmp_path, run, late(size_s, from_s, from_s + lasts_s))
+    told = accept(load(spec), [log], AcceptSettings(("latency", "lever_arm")), seed=0)
+    rows = {(row.role, row.assumption): row for row in told.assumptions}
+    row = rows["position", "latency"]
+    assert row.status == "broken", row
+    assert row.measured is not None
+    assert row.measured.low is not None
+    assert row.measured.high is not None
+    assert row.measured.low < size_s < row.measured.high
+    assert row.measured.high - row.measured.low < 0.2 * size_s
+    assert told.groups == ()
+    assert rows["position", "lever_arm"].status != "broken"
