@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,14 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.accept_world import MOTIONS, Drive, Fault, write
 from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.stretches import stretches
 from syncline_design.diagnosis.system import measured
 from syncline_design.logs.log import Log
 from syncline_design.model.system import System
 from syncline_design.spec.load import load
-from tests.test_accept_stretches import fastest_s, files, late, world
+from tests.test_accept_stretches import fastest_s, files, late, seen, settled, world
 
 
 def held(log: Path, columns: Sequence[str], from_s: float, to_s: float) -> Path:
@@ -108,3 +111,44 @@ def test_a_large_delay_for_a_while_is_sized_and_no_arm(
     assert row.measured.high - row.measured.low < 0.2 * size_s
     assert told.groups == ()
     assert rows["position", "lever_arm"].status != "broken"
+
+
+def turned_from(log: Path, share: float, size_deg: float) -> Path:
+    """The log with azimuths that are too large from a share of its rows on."""
+    lines = [line.split(",") for line in log.read_text("utf-8").splitlines()]
+    at = lines[0].index("azimuth_deg")
+    for row in lines[1 + round(share * (len(lines) - 1)) :]:
+        row[at] = f"{float(row[at]) + size_deg:.6f}"
+    log.write_text("\n".join(",".join(line) for line in lines) + "\n", "utf-8")
+    return log
+
+
+@pytest.mark.parametrize(
+    ("name", "seed", "size_deg"),
+    [("car_stops", 3, 0.15), ("car_stops", 3, 0.5), ("fixed_wing_circuits", 2, 0.5)],
+)
+def test_azimuths_that_are_off_from_half_of_the_log_on_stand_out_from_then_on(
+    name: str, seed: int, size_deg: float, tmp_path: Path
+) -> None:
+    """They raise the median of what short windows show, and pass for slow noise of the angles."""
+    spec, log = files(tmp_path, world(name, seed))
+    first = seen(spec, turned_from(log, 0.5, size_deg)).stands[0]
+    assert first.sure
+    assert first.noise_of == ()
+    assert not first.inside
+    assert first.from_s == pytest.approx(30.0, abs=1.0)
+    told = {first.label[0]: first.values} | {one.label[0]: one.values for one in first.instead}
+    assert "azimuth_bias" in told
+    assert told["azimuth_bias"][0] == pytest.approx(math.radians(size_deg), rel=0.1)
+
+
+@pytest.mark.parametrize("vehicle", ["quadrotor", "glider", "van"])
+@pytest.mark.parametrize("noise", ["slow", "flicker"])
+def test_slow_noise_of_a_sound_log_changes_nothing_once(
+    vehicle: str, noise: str, tmp_path: Path
+) -> None:
+    """A memory of 25 s, or of all of the log, moves its halves apart by far more than white."""
+    drive = Drive(vehicle, MOTIONS[len(vehicle) % 3], noise, 708)
+    data, model, known = settled(*write(drive, Fault(), tmp_path))
+    stands = stretches(data, model, known, 0).stands
+    assert [s for s in stands if s.sure and not s.noise_of and s.log_p < -100.0] == []

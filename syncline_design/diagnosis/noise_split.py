@@ -5,7 +5,9 @@ readings of a sensor,
     I_ab = tr(S^-1 C_a S^-1 C_b) / 2,   g_a = e' S^-1 C_a S^-1 e / 2 - tr(S^-1 C_a S^-1 F) / 2,
 summed over the rows, t = I^-1 g, again until it rests (Fisher scoring of normal variance
 components).  Its covariance is that of leaving out one of sixteen stretches after the other, so
-tails count, and beside it what the fitted slow noise makes of so long a mean square.  Ranges and
+tails count, and at least I^-1, which normal noise leaves at best: sixteen stretches that happen to
+agree are no proof where sensors are hardly told apart.  Beside it counts what the fitted slow noise
+makes of so long a mean square.  Ranges and
 bearings are two devices in one sensor and have a t each, and so have readings that were found
 unlike.
 Source: Searle, Casella, McCulloch, Variance Components (1992), ch. 6.
@@ -87,8 +89,24 @@ def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[
     parts = np.stack([_on(one.covariance, axes) for one in split])
     whole = white_covariance(data.structure, as_specified(data.structure))
     fixed = _on(whole, axes) - parts.sum(0)
+    values, spread = estimated(error, parts, fixed)
+    slow = np.array([_of_slow(data, model, one) for one in split])
+    reach = np.hypot(spread, NORMAL_95 * slow)
+    found: dict[SensorKey, list[tuple[NoiseFactor, float]]] = {}
+    for one, v, r in zip(split, values, reach, strict=True):
+        names = tuple(READINGS[one.sensor[1]][k] for k in one.readings)
+        factor = NoiseFactor(_root(v), _root(v - r), _root(v + r), names if len(names) < 3 else ())
+        found.setdefault(one.sensor, []).append((factor, _share(data, one)))
+    return {"/".join(key): _loudest_first(own, _sigma(data, key)) for key, own in found.items()}
+
+
+def estimated(error: Array, parts: Array, fixed: Array) -> tuple[Array, Array]:
+    """t of every part, and half of its 95 % interval without slow noise, (m,).
+
+    error (n, k), parts (m, n, k, k), fixed (n, k, k).
+    """
     block = np.arange(len(error)) * BLOCKS // len(error)
-    share = np.ones(len(split))
+    share = np.ones(len(parts))
     for _ in range(ROUNDS):
         information, score = _sums(error, parts, fixed, share, block)
         share = np.maximum(_solved(information.sum(0), score.sum(0)), LEAST)
@@ -97,14 +115,9 @@ def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[
             for i, s in zip(information, score, strict=True)]  # fmt: skip
     off = np.array(less) - np.mean(less, axis=0)
     spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum(off**2, axis=0))
-    slow = np.array([_of_slow(data, model, one) for one in split])
-    reach = np.hypot(student_limit(0.025, BLOCKS - 1) * spread, NORMAL_95 * slow)
-    found: dict[SensorKey, list[tuple[NoiseFactor, float]]] = {}
-    for one, v, r in zip(split, values, reach, strict=True):
-        names = tuple(READINGS[one.sensor[1]][k] for k in one.readings)
-        factor = NoiseFactor(_root(v), _root(v - r), _root(v + r), names if len(names) < 3 else ())
-        found.setdefault(one.sensor, []).append((factor, _share(data, one)))
-    return {"/".join(key): _loudest_first(own, _sigma(data, key)) for key, own in found.items()}
+    at_best = np.sqrt(np.maximum(np.diag(_inverse(information.sum(0))), 0.0))
+    by_stretch = student_limit(0.025, BLOCKS - 1) * spread
+    return values, np.maximum(by_stretch, NORMAL_95 * at_best)
 
 
 def _of_slow(data: Data, model: Model, one: _Part) -> float:
@@ -202,7 +215,13 @@ def _sums(
 
 
 def _solved(information: Array, score: Array) -> Array:
+    found: Array = _inverse(information) @ score
+    return found
+
+
+def _inverse(information: Array) -> Array:
+    """Of columns scaled alike; nothing for directions that are not seen."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     inverse = np.linalg.pinv(information / scale[:, None] / scale, rcond=1e-9, hermitian=True)
-    found: Array = inverse @ (score / scale) / scale
+    found: Array = inverse / scale[:, None] / scale
     return found

@@ -107,7 +107,7 @@ def scanned(sums: BlockSums, width: int) -> Iterator[Windows]:
         if np.any(doubted) and length <= ALONE:
             least = own.copy()
             least[doubted] = _without_one(sums, length, np.flatnonzero(doubted), width)
-            log_p = np.maximum(log_p, _log_chi2(least / floor2, width))
+            log_p = np.maximum(log_p, log_chi2(least / floor2, width))
         log_p = np.where(seen, np.minimum(log_p + charge, 0.0), 0.0)
         yield Windows(length, log_p, clear, floor2, np.einsum("kpp->kp", normal))
 
@@ -120,10 +120,10 @@ def _chances(
     local: variances found in and beside each window, with their degrees of freedom; one beyond
     LOUDER times the usual variance makes the noise louder.
     """
-    log_p = _log_chi2(own / floor2, width)
+    log_p = log_chi2(own / floor2, width)
     for variance, freedom in local:
         louder = np.maximum(variance / max(LOUDER * usual, 1e-300), 1.0)
-        by_usual = _log_chi2(own / (floor2 * louder), width)
+        by_usual = log_chi2(own / (floor2 * louder), width)
         by_local = _log_f(own / (width * np.maximum(variance, 1e-300)), width, freedom)
         log_p = np.where(louder > 1.0, np.maximum(log_p, np.maximum(by_usual, by_local)), log_p)
     return log_p
@@ -158,7 +158,7 @@ def _without_one(sums: BlockSums, length: int, which: NDArray[np.int64], width: 
     return least
 
 
-def _log_chi2(square: Array, freedom: int) -> Array:
+def log_chi2(square: Array, freedom: int) -> Array:
     """log of the upper tail of chi-square, by its leading term where the library's underflows."""
     found = chi_square_log_beyond(square, freedom)
     return np.where(np.isfinite(found), found, -0.5 * square)

@@ -31,6 +31,7 @@ from syncline_design.diagnosis.noise import (
     white_covariance,
 )
 from syncline_design.diagnosis.noise_instead import noise_instead
+from syncline_design.diagnosis.once_changed import once_changed
 from syncline_design.diagnosis.one_course import OneCourse, one_course
 from syncline_design.diagnosis.scores import clean_errors
 from syncline_design.diagnosis.spans import cuttable
@@ -141,15 +142,28 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -
     whitened = _whitened(data, clean_errors(data, model, rng, DRAWS), model)
     hits: list[Hit] = []
     reaches: list[ShownSize] = []
-    for s in asked:
-        sums = _summed(data, whitened, s)
+    every = [(s, _summed(data, whitened, s)) for s in asked]
+    for s, sums in every:
         windows = list(scanned(sums, s.columns.shape[2]))
         hits += _hits(s, sums, windows)
         if s.candidate.effect.breaks in ASKED:
             reaches += _reaches(data, s, sums, windows)
+    hits += _changed(data, whitened, every)
     stands = (_beside_noise(data, whitened, asked, *one)
               for one in _stands(data, model, asked, hits))  # fmt: skip
     return Stretches(tuple(stands), tuple(reaches))
+
+
+def _changed(
+    data: Data, whitened: tuple[Array, Array], every: Sequence[tuple[Signature, BlockSums]]
+) -> Iterator[Hit]:
+    """What is built in and changed once, where it is beyond doubt no slow noise of a sensor."""
+    hit = once_changed(every)
+    root, left = whitened
+    if hit is not None and not noise_instead(
+        data, (root, left[0]), [hit.signature], (hit.from_s, hit.to_s), hit.scale2
+    ):
+        yield hit
 
 
 def _beside_noise(
