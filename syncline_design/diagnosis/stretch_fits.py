@@ -36,7 +36,7 @@ class Hit:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class WindowFit:
     """A candidate fitted in a window: nat saved with its figures paid for, and without.
 
     data: the log as it was fitted, its motion as late as its poses or not.
@@ -50,7 +50,7 @@ class Fit:
     data: Data
 
 
-def as_good(fits: Sequence[Fit], *, inside: bool) -> list[Fit]:
+def as_good(fits: Sequence[WindowFit], *, inside: bool) -> list[WindowFit]:
     """Those within AS_GOOD_NATS of the best, each figure paid for by half of log N nat.
 
     What breaks another row needs not pay: that it has more figures is no proof against it (a turn
@@ -68,7 +68,7 @@ def as_good(fits: Sequence[Fit], *, inside: bool) -> list[Fit]:
     return good
 
 
-def _near(fits: Sequence[Fit], best: Fit) -> list[Fit]:
+def _near(fits: Sequence[WindowFit], best: WindowFit) -> list[WindowFit]:
     row = _row(best.signature.candidate)
     return [
         each
@@ -78,7 +78,7 @@ def _near(fits: Sequence[Fit], best: Fit) -> list[Fit]:
     ]
 
 
-def fitted(data: Data, model: Model, white: Precision, s: Signature, hit: Hit) -> Fit | None:
+def fitted(data: Data, model: Model, white: Precision, s: Signature, hit: Hit) -> WindowFit | None:
     """One candidate in a window, with motion that is as late as the poses there or is not.
 
     All of a log says whose stamps its columns of motion carry, and nothing of a while in which one
@@ -112,7 +112,9 @@ def _on_its_own(data: Data, one: Candidate) -> Data:
     return replace(data, view=own)
 
 
-def _fitted_in(data: Data, model: Model, white: Precision, s: Signature, hit: Hit) -> Fit | None:
+def _fitted_in(
+    data: Data, model: Model, white: Precision, s: Signature, hit: Hit
+) -> WindowFit | None:
     """One candidate in a window beside the model's effects, in the spec's white noise."""
     view = data.view
     cut = cut_to(StampSpan(s.candidate.effect, hit.from_s, hit.to_s), s, view.log.time_s)
@@ -130,10 +132,10 @@ def _fitted_in(data: Data, model: Model, white: Precision, s: Signature, hit: Hi
     saved = white.negative_log_likelihood(model.error) - white.negative_log_likelihood(after)
     spreads = np.sqrt(scale2 * np.maximum(np.diag(covariance)[-len(slopes) :], 0.0))
     nats = saved / scale2 - 0.5 * len(slopes) * math.log(rows)
-    return Fit(s, nats, saved / scale2, values, tuple(map(float, spreads)), data)
+    return WindowFit(s, nats, saved / scale2, values, tuple(map(float, spreads)), data)
 
 
-def made(model: Model, fit: Fit) -> Array:
+def made(model: Model, fit: WindowFit) -> Array:
     """What a candidate would do to every row if it acted there (n, 3) [m]."""
     data = fit.data
     one = fit.signature.candidate

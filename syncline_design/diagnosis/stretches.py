@@ -36,7 +36,7 @@ from syncline_design.diagnosis.one_course import OneCourse, one_course
 from syncline_design.diagnosis.scores import clean_errors
 from syncline_design.diagnosis.spans import cuttable
 from syncline_design.diagnosis.stretch_ends import ends
-from syncline_design.diagnosis.stretch_fits import Fit, Hit, as_good, as_loud, fitted, made
+from syncline_design.diagnosis.stretch_fits import Hit, WindowFit, as_good, as_loud, fitted, made
 from syncline_design.diagnosis.stretch_windows import (
     ALONE,
     DOUBT,
@@ -294,7 +294,7 @@ def _to_the_row(data: Data, model: Model, hit: Hit) -> Hit:
     return replace(hit, from_s=first_s, to_s=last_s, margin_s=usual_s * own.margin)
 
 
-def _share(model: Model, fit: Fit, hit: Hit) -> float:
+def _share(model: Model, fit: WindowFit, hit: Hit) -> float:
     data = fit.data
     inside = (data.view.log.time_s >= hit.from_s) & (data.view.log.time_s <= hit.to_s)
     made_m = rms_m(data, made(model, fit) * inside[:, None])
@@ -308,7 +308,7 @@ def is_inside(from_s: float, to_s: float, ends_s: tuple[float, float]) -> bool:
     return from_s - first > margin_s and last - to_s > margin_s
 
 
-def _told(data: Data, fit: Fit) -> OtherFit:
+def _told(data: Data, fit: WindowFit) -> OtherFit:
     one = fit.signature.candidate
     return OtherFit(
         one.label, data.view.system.stages[one.stage].name,
