@@ -141,3 +141,21 @@ def test_starts_in_the_tracking_log_are_those_of_the_other_logs(tmp_path: Path) 
             begins = [cut.series.time_s[0] for cut in sessions_of(one, 3600.0)]
             wanted = [times[0] for times in _times(180.0)]
             assert begins == pytest.approx(wanted, abs=21.0), one.kind.name
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "sessions"),
+    [("0.002000", "0.000000", 2), ("0.000002", "0.000000", 2), ("0.000001", "0.000000", 1),
+     ("0.002000", "0.001871", 1)],
+)  # fmt: skip
+def test_a_wander_that_falls_to_none_is_a_start_of_ntpd(
+    before: str, after: str, sessions: int, tmp_path: Path
+) -> None:
+    """Away for 3 min; an average over eight updates falls by 7 % an update at most."""
+    times = START + POLL_S * np.arange(2 * ROWS)
+    times[ROWS:] += 180.0
+    wanders = [before] * ROWS + [after] + [before] * (ROWS - 1)
+    lines = [made.loopstats_line(t, 1e-5).replace("0.002000", wander)
+             for t, wander in zip(times, wanders, strict=True)]  # fmt: skip
+    (series,) = read_logs([write(tmp_path / "loopstats", lines)]).series
+    assert len(sessions_of(series, 3600.0)) == sessions

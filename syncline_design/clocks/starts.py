@@ -17,6 +17,10 @@ from syncline_design.clocks.series import Array, ClockSeries, DaemonName
 
 # Programs that only compare: nothing in their logs would tell a start of the clock from a silence.
 OF_NO_STARTS: Final[tuple[DaemonName, ...]] = ("csv", "gpsd", "ppstest")
+NTPD: Final[DaemonName] = "ntpd"
+# ntpd's wander is an average over eight updates (ntp_loopfilter.c) and keeps 93 % of what it was
+# from one to the next: from two of the last digit of loopstats it falls to none at a start only
+_LEAST_WANDER: Final = 1.5e-12
 _FIRST_UPDATE_S: Final = 1024.0  # chronyd's largest usual poll: sources tell of a start before it
 
 
@@ -29,6 +33,8 @@ def cuts(series: ClockSeries, gap_s: float) -> NDArray[np.int64]:
     """
     steps = np.diff(series.time_s)
     begun = series.restart[1:] & ~series.restart[:-1]  # several such lines are one start
+    if series.kind.family == NTPD:
+        begun |= series.opened[1:] & (series.skew[:-1] >= _LEAST_WANDER)
     opened = series.opened[1:] & ~series.opened[:-1]
     silent = steps > gap_s
     if series.kind.family not in OF_NO_STARTS:
