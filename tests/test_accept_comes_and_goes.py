@@ -6,13 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from benchmarks.accept_world import MOTIONS, Drive, Fault, write
 from syncline_design.comparison.accept import AcceptSettings, accept
+from syncline_design.diagnosis.built import _seen as seen_in
+from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.frozen import frozen
+from syncline_design.diagnosis.run import SearchedLog
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.stretches import stretches
 from syncline_design.diagnosis.system import measured
@@ -20,6 +25,7 @@ from syncline_design.logs.log import Log
 from syncline_design.model.system import System
 from syncline_design.spec.load import load
 from tests.test_accept_stretches import fastest_s, files, late, seen, settled, world
+from tests.world import hidden
 
 
 def held(log: Path, columns: Sequence[str], from_s: float, to_s: float) -> Path:
@@ -111,6 +117,48 @@ def test_a_large_delay_for_a_while_is_sized_and_no_arm(
     assert row.measured.high - row.measured.low < 0.2 * size_s
     assert told.groups == ()
     assert rows["position", "lever_arm"].status != "broken"
+
+
+def test_angles_that_are_late_for_a_while_turn_nothing(tmp_path: Path) -> None:
+    """0.3 s for 3 s of a turn: a window of it fits a turn of the ranging sensor better."""
+    run = world("fixed_wing_circuits", 2)
+    at_s = fastest_s(run)
+    steps = tuple(
+        hidden("timestamp_step", "attitude", step_s=size, time_s=when)
+        for size, when in ((0.3, at_s), (-0.3, at_s + 3.0))
+    )
+    spec, log = files(tmp_path, run, steps)
+    told = accept(load(spec), [log], AcceptSettings(("latency", "mounting", "noise")), seed=0)
+    rows = {(row.role, row.assumption): row for row in told.assumptions}
+    assert [key for key, one in rows.items() if one.status == "broken"] == [("attitude", "latency")]
+    figure = rows["attitude", "latency"].measured
+    assert figure is not None
+    assert figure.value == pytest.approx(0.3, rel=0.05)
+
+
+def test_a_delay_that_was_taken_for_louder_noise_is_a_delay(tmp_path: Path) -> None:
+    """Rows that one value makes up do not scatter, however loud a fit of the noise makes them."""
+    run = world("multirotor_lines", 5, 50.0, 4.0)
+    at_s = fastest_s(run)
+    steps = tuple(
+        hidden("timestamp_step", "attitude", step_s=size, time_s=when)
+        for size, when in ((0.25, at_s), (-0.25, at_s + 2.0))
+    )
+    data, model, known = settled(*files(tmp_path, run, steps))
+    sensor = next(w.sensor for w in data.structure.white if w.sensor[1] == "attitude")
+    loud = Episode(sensor, at_s, at_s + 2.0, 60.0, 5.0, 100.0)
+    search = SimpleNamespace(
+        proposals=SimpleNamespace(free_signatures=lambda _: known),
+        episodes=(loud,), settings=SimpleNamespace(seed=0),
+    )  # fmt: skip
+    louder = with_episodes(data, (loud,))
+    assert ("latency", "attitude", 0) not in [
+        s.label for s in stretches(louder, model, known, 0).stands if s.sure
+    ]
+    one = SimpleNamespace(data=louder, search=search, result=SimpleNamespace(model=model))
+    first = seen_in(cast(SearchedLog, one)).stands[0]
+    assert (first.label, first.sure) == (("latency", "attitude", 0), True)
+    assert first.values[0] == pytest.approx(0.25, rel=0.05)
 
 
 def turned_from(log: Path, share: float, size_deg: float) -> Path:

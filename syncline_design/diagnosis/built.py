@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.consequence import expected_rms_m
+from syncline_design.diagnosis.episodes import without_episodes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.instead import InItsPlace, in_place
@@ -30,7 +31,7 @@ from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.stretches import Stands, Stretches, left_as_one, stretches
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
-from syncline_design.effects import plain_delay
+from syncline_design.effects import plain_delay, registry
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -38,6 +39,7 @@ from syncline_design.spec.case import Case
 
 ROUNDS: Final = 3  # of taking out what stands out
 MOST_TAKEN: Final = 0.6  # of the rows
+NO_SCATTER: Final = 0.9  # of the square of rows that one value makes up
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +90,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             seen = _seen(one)
         model = one.result.model
         left = left_open(one.data, model, one.search.signatures)
-        stands = (*taken, *seen.stands)
+        stands = _apart((*taken, *seen.stands))
         return Sighted(
             told(one, case),
             replace(seen, stands=stands),
@@ -123,7 +125,41 @@ def _seen(one: SearchedLog) -> Stretches:
     in_force().doing("looking at stretches of the log")
     model = _built_in_undone(one)
     free = one.search.proposals.free_signatures(model)
-    return stretches(one.data, model, free, one.search.settings.seed)
+    seed = one.search.settings.seed
+    found = stretches(one.data, model, free, seed)
+    spans = [(each.from_s, each.to_s) for each in one.search.episodes or ()]
+    if not spans:
+        return found
+    as_usual = stretches(without_episodes(one.data), model, free, seed).stands
+    loud = [s for s in as_usual if _is_one_value(s) and any(_meet(s, *span) for span in spans)]
+    rest = [s for s in found.stands if not any(_meet(s, each.from_s, each.to_s) for each in loud)]
+    return replace(found, stands=(*loud, *rest))
+
+
+def _apart(stands: tuple[Stands, ...]) -> tuple[Stands, ...]:
+    """All but what is built in and lies within a while in which something came and went.
+
+    Where a window of a delay looked like a turn, and was left out, the rest of it is that delay.
+    """
+    goes = [s for s in stands if s.sure and registry()[s.label[0]].passing]
+    return tuple(
+        s for s in stands
+        if s in goes or not s.inside
+        or not any(each.from_s <= s.from_s and s.to_s <= each.to_s for each in goes)
+    )  # fmt: skip
+
+
+def _is_one_value(s: Stands) -> bool:
+    """Whether one value of what comes and goes makes up what an episode of noise was named for.
+
+    Rows that scatter are no multiple of what a delay does to them.
+    """
+    passing = registry()[s.label[0]].passing
+    return s.sure and passing and not s.others and not s.noise_of and s.explained > NO_SCATTER
+
+
+def _meet(s: Stands, from_s: float, to_s: float) -> bool:
+    return s.from_s <= to_s and from_s <= s.to_s
 
 
 def _built_in_undone(one: SearchedLog) -> Model:

@@ -79,6 +79,13 @@ def with_episodes(data: Data, found: tuple[Episode, ...]) -> Data:
     return replace(louder, axes=data.axes, noisier=data.noisier, explained=data.explained)
 
 
+def without_episodes(data: Data) -> Data:
+    """The data with white noise that is as loud all along."""
+    white = tuple(replace(part, growth=None) for part in data.structure.white)
+    usual = data_of(data.view, replace(data.structure, white=white))
+    return replace(usual, axes=data.axes, noisier=data.noisier, explained=data.explained)
+
+
 def episodes(data: Data, model: Model, rng: np.random.Generator) -> tuple[Episode, ...]:
     """The episodes of a log, the clearest first."""
     if len(data.view) < LEAST_ROWS:

@@ -73,6 +73,7 @@ class Stands:
     whether it begins and ends within the log, as what is built in does not.  margin_s: by which its
     ends may be off.  share: RMS that it makes in the log, over what the spec's noise makes.
     noise_of: the sensors whose slow noise does there as well; none of a constant beyond doubt.
+    explained: the part of the square of what is left there that it makes up.
     frozen: whether it is one reading that is given over and over, of which the value is the age.
     """
 
@@ -91,6 +92,7 @@ class Stands:
     share: float = 0.0
     noise_of: tuple[str, ...] = ()
     frozen: bool = False
+    explained: float = 0.0
 
     @property
     def others(self) -> tuple[Label, ...]:
@@ -273,7 +275,7 @@ def _named(data: Data, model: Model, asked: Sequence[Signature], hit: Hit) -> St
     return Stands(
         own.label, own.stage, hit.from_s, hit.to_s, own.parameters, own.values, own.spreads,
         hit.log_p, hit.log_p < math.log(SURE), others, inside, hit.margin_s,
-        _share(model, named, hit),
+        _share(model, named, hit), explained=_explained(model, named, hit),
     )  # fmt: skip
 
 
@@ -299,6 +301,14 @@ def _share(model: Model, fit: WindowFit, hit: Hit) -> float:
     inside = (data.view.log.time_s >= hit.from_s) & (data.view.log.time_s <= hit.to_s)
     made_m = rms_m(data, made(model, fit) * inside[:, None])
     return made_m / max(expected_rms_m(data), 1e-300)
+
+
+def _explained(model: Model, fit: WindowFit, hit: Hit) -> float:
+    time_s = fit.data.view.log.time_s
+    inside = (time_s >= hit.from_s) & (time_s <= hit.to_s)
+    left = np.nan_to_num(model.error)[inside]
+    less = left - np.nan_to_num(made(model, fit))[inside]
+    return 1.0 - float(np.sum(less**2)) / max(float(np.sum(left**2)), 1e-300)
 
 
 def is_inside(from_s: float, to_s: float, ends_s: tuple[float, float]) -> bool:
