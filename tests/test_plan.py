@@ -371,7 +371,7 @@ def test_a_drive_that_is_driven_names_what_was_hidden(pair: PlanRun, spec: Path)
     [
         (["--reach", "latancy(position)=1 ms"], "there is no effect 'latancy'"),
         (["--reach", "latency(target)=1 ms"], "does not act on 'target'"),
-        (["--reach", "latency(position)=1 cm"], "latency_s is no such quantity"),
+        (["--reach", "latency(position)=1 cm"], "cannot read latency_s"),
         (["--reach", "latency(position)=0 ms"], "expected a tolerance above 0"),
         (["--reach", "latency(position)"], "expected effect(sensor)=TOLERANCE"),
         (["--reach", "timestamp_jitter(position)=1 ms"], "only scatters"),

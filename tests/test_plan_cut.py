@@ -204,6 +204,39 @@ def test_an_area_holds_the_run_up_and_the_run_out(tmp_path: Path) -> None:
     assert np.all(taken_m(run) <= 0.9 * small_m + 1e-6)
 
 
+def test_an_area_holds_them_for_a_drive_of_several_legs(tmp_path: Path) -> None:
+    """A boat that turns wide, by the places of its mission: from where its run-up begins on."""
+    path = tmp_path / "boat.yaml"
+    text = TRACTOR.replace("motion: ground", "motion: surface, area: [60 m, 50 m]")
+    path.write_text(text.replace("acceleration: 0.8", "acceleration: 0.3"), encoding="utf-8")
+    wanted = PlanWanted((), separate_of("heading_bias(attitude)", "boresight(ranging)"))
+    run = planned(load(path), PlanRequest(wanted, minutes=4.0, line_plans=False))
+    assert len(run.result.legs) > 1
+    assert run.approach.run_up_m is not None
+    places = np.vstack([run.path.position_m, *run.approach.places_m])
+    north, east = np.ptp(places[:, :2], axis=0)
+    assert north <= 54.0 + 0.5
+    assert east <= 45.0 + 0.5
+
+
+def test_what_is_plausible_of_itself_holds_no_tolerance(tmp_path: Path) -> None:
+    """A filter of 0.1 s left free leaves a delay of a tractor that is asked to 20 ms at nearly as
+    much: by hand, of the information on both the log leaves next to none across."""
+    run = asked(tmp_path, PlanWanted(reach_of("latency(position)=20 ms")))
+    found = {
+        one.effect: one.sigma["latency(position).latency_s"] for one in run.result.untold or ()
+    }
+    assert found["filter_lag(position)"] == pytest.approx(0.1, rel=0.2)
+
+
+def test_what_a_pair_is_told_from_is_not_taken_as_known(tmp_path: Path) -> None:
+    """A delay of 300 ms is told from a filter beyond first order."""
+    pair = separate_of("latency(position)=300 ms", "filter_lag(position)")
+    run = asked(tmp_path, PlanWanted((), pair))
+    assert run.result.reached
+    assert "filter_lag(position)" not in {one.effect for one in run.result.untold or ()}
+
+
 def taken_m(run: PlanRun) -> Array:
     """North and east extent of a drive, 1.5 v^2 / 0.8 / 1.8 m before and after with it."""
     place, way = run.path.position_m[:, :2], np.diff(run.path.position_m[:, :2], axis=0)

@@ -15,11 +15,19 @@ from scipy.signal import find_peaks
 from scipy.spatial.transform import Rotation
 
 import syncline_design as sd
+from syncline_design.effects.record import Array
 from syncline_design.planning.areas import tight_areas
 from syncline_design.planning.drives import outcome, whole_drive
 from syncline_design.planning.leg_library import library
 from syncline_design.planning.legs import MOST_LEG_S, transition
-from syncline_design.planning.path import STEP_S, CourseCommands, joined, travelled, unasked
+from syncline_design.planning.path import (
+    STEP_S,
+    CourseCommands,
+    PathStates,
+    joined,
+    travelled,
+    unasked,
+)
 from syncline_design.planning.run import plan as planned
 from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.telling import PlanRun, Telling
@@ -71,25 +79,34 @@ def test_a_drive_that_leaves_its_area_is_said_to(car: Path) -> None:
     setup = replace(setup, world=replace(setup.world, vehicles=(tight,)))
     run = Telling(setup).whole(outcome(setup.world, told), None, 240.0)
     (beyond,) = run.result.cautions or ()
-    north, east = np.ptp(run.path.position_m[:, :2], axis=0)
+    north, east = np.ptp(with_runs(run.path, 1.2 * 2.0), axis=0)
     assert f"takes {north:.0f} m by {east:.0f} m, beyond its area of 150 m by 20 m" in beyond
 
 
 def test_what_an_area_is_too_small_for_is_said_where_nothing_is_enough(tmp_path: Path) -> None:
     """By the places of each leg driven alone, and a tenth of the area left at its edges."""
-    area, ground = ("area: [250 m, 250 m]", "area: [60 m, 30 m]"), ("multirotor", "ground")
+    area, ground = ("area: [250 m, 250 m]", "area: [62 m, 30 m]"), ("multirotor", "ground")
     path = spec_with(tmp_path, area, ground)
     wanted = PlanWanted(reach_of("latency(position)=1 us"))
     setup = Setup.begun(load(path), PlanRequest(wanted, minutes=1.0, line_plans=False))
     taken = []
     for told in setup.told:
         _, (course,) = whole_drive(setup.world, [told])
-        taken.append(np.ptp(travelled(setup.world.vehicles[0], course).position_m[:, :2], axis=0))
-    fitting = sum(bool(np.all(one <= 0.9 * np.array([60.0, 30.0]))) for one in taken)
+        path = travelled(setup.world.vehicles[0], course)
+        taken.append(np.ptp(with_runs(path, 1.2 * 2.0), axis=0))
+    fitting = sum(bool(np.all(one <= 0.9 * np.array([62.0, 30.0]))) for one in taken)
     assert 0 < fitting < len(taken)
     (words,) = tight_areas(setup)
     assert words.startswith(f"{fitting} of the {len(taken)} legs that vehicle can drive stay")
-    assert "area of 60 m by 30 m" in words
+    assert "area of 62 m by 30 m" in words
+
+
+def with_runs(path: PathStates, twice_gain_mps2: float) -> Array:
+    """North and east of a path, and of what it takes to gain and to lose its speed, v^2 / (2 a)."""
+    begins, ends = path.velocity_mps[0, :2], path.velocity_mps[-1, :2]
+    before, after = (np.linalg.norm(v) * v / twice_gain_mps2 for v in (begins, ends))
+    place = path.position_m[:, :2]
+    return np.vstack([place[0] - before, place, place[-1] + after])
 
 
 def test_effects_that_look_alike_are_told_apart_where_one_is_large(

@@ -151,9 +151,11 @@ USUAL = {"fixed_wing": (4.0, 0.6), "surface": (0.3, 0.0), "underwater": (0.15, 0
 
 def test_missions_hold_the_run_up_and_the_run_out(other: PlanRun) -> None:
     """(v^2 - v0^2) / (1.2 a) straight on before and after, at most half of v_max a second: without
-    them an autopilot gains its speed after the begin and brakes before the end."""
+    them an autopilot gains its speed after the begin and brakes before the end.  What cannot stop
+    has two radii of its turn: v over 0.75 omega_max or 0.8 a / v, at least v_max / omega_max."""
     acceleration, slowest = USUAL[other.motion]
-    most = {"fixed_wing": 25.0, "surface": 5.0, "underwater": 2.0}[other.motion]
+    most, omega = {"fixed_wing": (25.0, math.radians(30.0)), "surface": (5.0, math.radians(10.0)),
+                   "underwater": (2.0, math.radians(15.0))}[other.motion]  # fmt: skip
     path, items = other.path, json.loads(render_plan("qgc", other))["mission"]["items"]
     places = [
         np.array(pymap3d.geodetic2ned(lat, lon, ORIGIN[2] + height, *ORIGIN))[:2]
@@ -164,13 +166,22 @@ def test_missions_hold_the_run_up_and_the_run_out(other: PlanRun) -> None:
     for place, end, inside, k in ends:
         step_s = abs(path.time_s[k] - path.time_s[k + 1 if k < 0 else 0])
         speed = float(np.linalg.norm(inside - end)) / step_s
-        long_m = (speed**2 - (slowest * most) ** 2) / (1.2 * min(acceleration, 0.5 * most))
+        gain = min(acceleration, 0.5 * most)
+        long_m = (speed**2 - (slowest * most) ** 2) / (1.2 * gain)
+        if slowest:
+            radii = speed / (0.75 * omega), speed**2 / (0.8 * gain), most / omega
+            long_m = max(long_m, 2.0 * max(radii))
         away = place - end
         assert float(np.linalg.norm(away)) == pytest.approx(max(long_m, 0.0), rel=0.05, abs=0.1)
         if long_m > 0.5:
             ahead = (end - inside) / float(np.linalg.norm(end - inside))
             assert float(away @ ahead) == pytest.approx(float(np.linalg.norm(away)), rel=0.02)
-    first = next(i["params"][1] for i in items if i["command"] == 178)
+    asked = [i for i in items if i["command"] in (16, 178)]
+    assert asked[0]["command"] == 178  # the speed before the way to the first place
+    kind, first = asked[0]["params"][:2]
+    assert kind == (
+        0 if other.motion == "fixed_wing" else 1
+    )  # of ArduPlane 1 is a least
     begun = float(np.linalg.norm(way[1] - way[0])) / float(path.time_s[1] - path.time_s[0])
     assert first == pytest.approx(begun, rel=0.1, abs=0.05)
 

@@ -99,11 +99,11 @@ def test_a_class_is_told_at_once_and_what_no_drive_tells_is_left_out(spec: Path)
 @pytest.mark.parametrize(
     ("first", "words"),
     [
-        (f"{LATENCY}=5 m", "latency_s is no such quantity"),
+        (f"{LATENCY}=5 m", "cannot read latency_s"),
         (f"{LATENCY}=0 s", "expected a size other than 0"),
         (f"{LATENCY}=[1 s, 2 s]", "expected 1 size, of latency_s; found 2"),
         ("lever_arm(position)=1 cm", "expected 3 sizes, of x_m, y_m, z_m; found 1"),
-        (f"{LATENCY}=", "latency_s is no such quantity"),
+        (f"{LATENCY}=", "cannot read latency_s"),
     ],
 )
 def test_sizes_that_are_none_are_refused(spec: Path, first: str, words: str) -> None:

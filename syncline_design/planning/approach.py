@@ -1,8 +1,9 @@
 """What lies before and after a drive that begins and ends at some speed: run-up and run-out.
 
 A vehicle that is to begin at v gains it on the way (v^2 - v0^2) / (2 a), from the slowest speed v0
-that it can hold, straight ahead; and slows down on as much after the end.  None of it is logged or
-counted on; a mission flies it, and an area has to hold it.
+that it can hold, straight ahead, and slows down on as much after the end; what cannot stop needs
+two radii of its turn.  None of it is logged or counted on; a mission flies it, and an area has to
+hold it.
 """
 
 from __future__ import annotations
@@ -31,6 +32,11 @@ class Approach:
     run_up_m: Array | None
     run_out_m: Array | None
 
+    @property
+    def places_m(self) -> list[Array]:
+        """Those of the two that there are."""
+        return [place for place in (self.run_up_m, self.run_out_m) if place is not None]
+
 
 def approach(vehicle: Vehicle, path: PathStates) -> Approach:
     """Before and after a path, along the ways that it begins and ends on, on the level."""
@@ -45,7 +51,7 @@ def approach(vehicle: Vehicle, path: PathStates) -> Approach:
 
 def run_up_words(vehicle: Vehicle, begins_mps: float) -> str:
     """How long the run-up to a leg is, to put behind what to do in it; none where there is none."""
-    way_m = vehicle.gaining_m(begins_mps)
+    way_m = vehicle.run_m(begins_mps)
     if way_m <= LEAST_M:
         return ""
     return f"; before it a run-up of {to_digits(way_m, 2)} m straight on, not logged"
@@ -59,7 +65,7 @@ def _level(velocity_mps: Array) -> Array:
 def _away(from_m: Array, velocity_mps: Array, vehicle: Vehicle) -> Array | None:
     """The place that far off in a direction of motion."""
     speed = float(np.linalg.norm(velocity_mps))
-    way_m = vehicle.gaining_m(speed)
+    way_m = vehicle.run_m(speed)
     if way_m <= LEAST_M:
         return None
     place: Array = from_m + way_m / speed * velocity_mps

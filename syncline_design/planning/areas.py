@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from syncline_design.model.figure_text import to_digits, to_places
+from syncline_design.planning.approach import approach
 from syncline_design.planning.placing import AREA_SHARE, Place, way_of
 from syncline_design.planning.planned_log import Drive
 from syncline_design.planning.setup import Setup
@@ -15,7 +16,8 @@ from syncline_design.planning.setup import Setup
 def beyond_areas(setup: Setup, driven: Drive) -> Iterator[str]:
     """Vehicles that leave their area."""
     for vehicle, states in zip(setup.world.vehicles, driven.states, strict=True):
-        north, east = (float(size) for size in np.ptp(states.position_m[:, :2], axis=0))
+        places = np.vstack([states.position_m, *approach(vehicle, states).places_m])[:, :2]
+        north, east = (float(size) for size in np.ptp(places, axis=0))
         if vehicle.area_m is not None and (north > vehicle.area_m[0] or east > vehicle.area_m[1]):
             own, most = _size((north, east)), _size(vehicle.area_m)
             yield f"The drive of {vehicle.stage} takes {own}, beyond its area of {most}."

@@ -242,6 +242,7 @@ class World:
                 tuple(
                     _swept(travelled(one, transition(one, QUARTER_RAD * k))) for k in range(-2, 3)
                 ),
+                one.run_m(one.join_mps),
             )
             for one in self.vehicles
         )
@@ -268,9 +269,10 @@ def _with_approach(vehicle: Vehicle, leg: Leg) -> Swept:
     takes to gain its speed and to lose it."""
     begun = transition(vehicle, 0.0, leg.begins_mps)
     path = travelled(vehicle, joined([begun, leg.course]))
-    beside = approach(vehicle, path)
-    ends = [place for place in (beside.run_up_m, beside.run_out_m) if place is not None]
-    places = np.vstack([path.position_m, *ends])[:, :2] - path.position_m[len(begun), :2]
+    places = (
+        np.vstack([path.position_m, *approach(vehicle, path).places_m])[:, :2]
+        - path.position_m[len(begun), :2]
+    )
     (south, west), (north, east) = (
         tuple(map(float, of(places, axis=0))) for of in (np.min, np.max)
     )

@@ -65,7 +65,10 @@ def others_of(
     asked = np.isfinite(goal.tolerance)
     told = inflation < np.where(asked, HARDLY, INSEPARABLE)
     limit = np.where(told & ~goal.only_rival, np.maximum(WIDENED, 1.5 * inflation), np.inf)
-    untold = np.where(~told & ~goal.only_rival, WIDENED, np.inf)
+    paired = {k for pair in goal.pairs for k in (*pair.first, *pair.second)}
+    # what is part of a pair says itself whether it is told
+    beside = np.array([int(k) not in paired for k in index[:, 0]])
+    untold = np.where(~told & ~goal.only_rival & beside[:, None], WIDENED, np.inf)
     return (
         found.some(np.any(np.isfinite(limit), axis=1), limit),
         found.some(np.any(np.isfinite(untold), axis=1), untold),
@@ -88,13 +91,19 @@ def taken_by(
 ) -> dict[int, dict[int, float]]:
     """What is wanted that other effects, each as large as is plausible, would leave beyond twice
     what is asked, or beyond their limit: by the first place of the effect, the sigma of each.  The
-    effect first that leaves most, over what it may."""
+    effect first that leaves most, over what it may.
+
+    Of what is wanted itself next to nothing is known before: a tolerance near what is plausible
+    would be held by that alone.
+    """
     wanted = list(goal.wanted)
     if not len(others.index):
         return {}
     covariance, _ = covariance_of(information[np.ix_(wanted, wanted)], VAGUE * prior[wanted])
     sigma = np.sqrt(np.diag(covariance))
-    left = others.widened(information, wanted, prior)
+    before = prior.copy()
+    before[wanted] *= VAGUE
+    left = others.widened(information, wanted, before)
     asked = np.isfinite(goal.tolerance)
     most = np.where(asked, TWICE * goal.tolerance, others.limit * sigma)
     beyond = np.isfinite(others.limit) & (left > most)

@@ -59,10 +59,14 @@ STILL: Final = Swept()
 @dataclass(frozen=True, slots=True)
 class Room:
     """Where a vehicle has to stay: north and east extent [m], and what its turns to a leg take, by
-    -2 to 2 quarters."""
+    -2 to 2 quarters.
+
+    run_m: what it takes to gain the speed that legs begin at, and to lose it.
+    """
 
     area_m: Place
     turns: tuple[Swept, ...]
+    run_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,12 @@ class LegTold:
     room: Room | None = None
 
     _known: dict[float, tuple[Way, ...]] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def run_m(self) -> float:
+        """The run-up before a drive that it begins, and the run-out after one that it ends; of one
+        that is a drive of its own, both are in what it takes."""
+        return 0.0 if self.room is None or self.leg.begins_mps is not None else self.room.run_m
 
     @property
     def area_m(self) -> Place | None:
@@ -166,6 +176,7 @@ class LegsEnd:
     heading now, and when; box_m: what they took on their way, south, north, west and east.
 
     A drive begins straight ahead, northwards: the way back is north where nothing was driven.
+    run_m: the run-out, straight on from there.
     """
 
     place_m: Place = (0.0, 0.0)
@@ -173,6 +184,7 @@ class LegsEnd:
     heading_rad: float = 0.0
     end_s: float = 0.0
     box_m: Box = (0.0, 0.0, 0.0, 0.0)
+    run_m: float = 0.0
 
     def then(self, told: LegTold) -> tuple[Placed, LegsEnd]:
         """One more leg, at the heading that ends nearest to the start, the way back first; within
@@ -198,8 +210,14 @@ class LegsEnd:
 
     @property
     def extent_m(self) -> Place:
-        """North to south and east to west that was taken [m], with the turns between the legs."""
-        south, north, west, east = self.box_m
+        """North to south and east to west that was taken [m], with the turns between the legs, the
+        run-up and the run-out."""
+        (north, east), run_m = self.place_m, self.run_m
+        out = (
+            north + run_m * math.cos(self.heading_rad),
+            east + run_m * math.sin(self.heading_rad),
+        )
+        south, north, west, east = around(self.box_m, out, STILL.box_m)
         return north - south, east - west
 
     def within(self, area_m: Place | None) -> bool:
@@ -212,9 +230,10 @@ class LegsEnd:
         placed = Placed(told, way.heading, way.turn_rad, self.end_s + way.turn_s)
         (north, east), (more, off) = self.place_m, way.swept.moved_m
         heading_rad = QUARTER_RAD * way.heading + told.turned_rad
-        box = around(self.box_m, self.place_m, way.swept.box_m)
+        before = self.box_m if self.end_s else (-told.run_m, 0.0, 0.0, 0.0)
+        box = around(before, self.place_m, way.swept.box_m)
         return placed, LegsEnd(
-            (north + more, east + off), way.heading, heading_rad, placed.end_s, box
+            (north + more, east + off), way.heading, heading_rad, placed.end_s, box, told.run_m
         )
 
 

@@ -28,6 +28,7 @@ LEANING: Final = ("multirotor", "fixed_wing")  # motions that lean with their ac
 BELOW: Final = ("mbes", "sonar", "usbl", "echo", "imaging_sonar", "multibeam")
 LONGEST_TURN_S: Final = 3600.0  # a turn about that takes longer is none
 HEIGHT_SHARE: Final = 0.6  # of the range d that the targets lie below
+LINED_UP: Final = 2.0  # radii of a turn after which a vehicle that came round is on its line
 FAR: Final = 0.95  # of the range d at which targets are at most
 STEEP_RAD: Final = math.radians(75.0)  # below the level, at most: beyond, azimuths mean nothing
 HIGHEST: Final = FAR * math.sin(STEEP_RAD)  # of the range d, over targets that are in sight
@@ -125,6 +126,17 @@ class Vehicle:
         ALONG of the acceleration."""
         gained = max(speed_mps**2 - self.slowest_mps**2, 0.0)
         return gained / (2.0 * ALONG * self.acceleration_mps2)
+
+    def run_m(self, speed_mps: float) -> float:
+        """Way straight on before a drive that begins at a speed, and after one that ends at it.
+
+        What cannot stop comes from anywhere at some speed: it needs room to get onto the line, and
+        turns off it before the last place that it is sent to; two radii of its turn.
+        """
+        gaining_m = self.gaining_m(speed_mps)
+        if self.slowest_mps <= 0.0 or speed_mps <= 0.0:
+            return gaining_m
+        return max(gaining_m, LINED_UP * speed_mps / self.turn_radps(speed_mps))
 
     def turn_radps(self, speed_mps: float) -> float:
         """Largest turn rate at a speed: omega_max, a lateral acceleration, a radius."""

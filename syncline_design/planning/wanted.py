@@ -123,7 +123,7 @@ def _stated_sizes(one: NamedEffect, amount: str) -> dict[str, float]:
             kind = suffix_unit(key)[1]
             found[key] = _amount(text.strip(), kind)
         except UnitError as error:
-            raise PlanError(f"{where}: {key} is no such quantity: {error}") from None
+            raise PlanError(f"{where}: cannot read {key}: {error}") from None
     if not any(found.values()) or not all(map(math.isfinite, found.values())):
         raise PlanError(f"{where}: expected a size other than 0")
     return found
@@ -162,7 +162,7 @@ def _tolerance(one: NamedEffect, amount: str) -> float:
         try:
             value = _amount(amount, kind)
         except UnitError as error:
-            problem = f"--reach {one.text}={amount}: {name} is no such quantity: {error}"
+            problem = f"--reach {one.text}={amount}: cannot read {name}: {error}"
             continue
         if not (0.0 < value < math.inf):
             raise PlanError(f"--reach {one.text}={amount}: expected a tolerance above 0")

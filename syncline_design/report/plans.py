@@ -25,6 +25,7 @@ COLUMNS: Final = (
 KML: Final = "http://www.opengis.net/kml/2.2"
 WAYPOINT, CHANGE_SPEED, TAKEOFF = 16, 178, 22  # MAV_CMD of MAVLink's common set
 HEADING, REVERSE = 115, 194  # the same: CONDITION_YAW, DO_SET_REVERSE
+AIRSPEED, GROUND_SPEED = 0, 1  # SPEED_TYPE of CHANGE_SPEED
 RELATIVE, MISSION = 3, 2  # MAV_FRAME: relative to home; of a command without a place
 GENERIC, FIXED_WING, QUADROTOR, ROVER, BOAT, SUBMARINE = 0, 1, 2, 10, 11, 12  # MAV_TYPE
 VEHICLES: Final = {
@@ -209,20 +210,27 @@ def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
         speed = round(float(np.linalg.norm(step)) / lasts, 2) if lasts > 0.0 else 0.0
         moving = speed > 0.05
         if moving and abs(speed - said) > 0.02 * max(speed, said):
-            yield _item(CHANGE_SPEED, [1, speed, -1, 0, 0, 0, 0], MISSION)
+            yield _at_speed(run, speed)
             said = speed
         yield from headed.get(k, ())
         to = round(math.degrees(yaw[k]) % 360.0, 1)
         if k == 0 and run.approach.run_up_m is not None:
             said = round(run.approach.begins_mps, 2)
+            yield _at_speed(run, said)
             yield _item(WAYPOINT, [0, 0, 0, to, *_place(begun, height[0])])
-            yield _item(CHANGE_SPEED, [1, said, -1, 0, 0, 0, 0], MISSION)
         hold = 0.0 if moving else round(lasts, 1)
         yield _item(WAYPOINT, [hold, 0, 0, to, *_place(places[k], height[k])])
     if run.approach.run_out_m is not None:  # without it an autopilot brakes before the end
         yield _item(
             WAYPOINT, [0, 0, 0, to, *_place(_beside(run, run.approach.run_out_m), height[-1])]
         )
+
+
+def _at_speed(run: PlanRun, speed_mps: float) -> dict[str, Any]:
+    """The speed from here on.  ArduPlane takes a speed over ground for the least that it may have,
+    and goes at the speed through the air that it was told; the plan is made for still air."""
+    kind = AIRSPEED if run.motion == "fixed_wing" else GROUND_SPEED
+    return _item(CHANGE_SPEED, [kind, speed_mps, -1, 0, 0, 0, 0], MISSION)
 
 
 def _beside(run: PlanRun, place_m: Any) -> Any:
