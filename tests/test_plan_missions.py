@@ -179,9 +179,7 @@ def test_missions_hold_the_run_up_and_the_run_out(other: PlanRun) -> None:
     asked = [i for i in items if i["command"] in (16, 178)]
     assert asked[0]["command"] == 178  # the speed before the way to the first place
     kind, first = asked[0]["params"][:2]
-    assert kind == (
-        0 if other.motion == "fixed_wing" else 1
-    )  # of ArduPlane 1 is a least
+    assert kind == (0 if other.motion == "fixed_wing" else 1)  # of ArduPlane 1 is a least
     begun = float(np.linalg.norm(way[1] - way[0])) / float(path.time_s[1] - path.time_s[0])
     assert first == pytest.approx(begun, rel=0.1, abs=0.05)
 

@@ -45,7 +45,7 @@ def plan(
         typer.Option(
             metavar="A B",
             help='"latency(position)" "lever_arm(position)"; "latency(position)=100 ms" where its '
-            "size is known; several rivals in one text: \"latency(position)\" \"B, C\".",
+            'size is known; several rivals in one text: "latency(position)" "B, C".',
         ),
     ] = None,
     reach: Annotated[
