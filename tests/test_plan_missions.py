@@ -150,7 +150,7 @@ USUAL = {"fixed_wing": (4.0, 0.6), "surface": (0.3, 0.0), "underwater": (0.15, 0
 
 
 def test_missions_hold_the_run_up_and_the_run_out(other: PlanRun) -> None:
-    """(v^2 - v0^2) / (1.2 a) straight on before and after, at most half of v_max a second: without
+    """(v^2 - v0^2) / (2 a) straight on before and after, at most half of v_max a second: without
     them an autopilot gains its speed after the begin and brakes before the end.  What cannot stop
     has two radii of its turn: v over 0.75 omega_max or 0.8 a / v, at least v_max / omega_max."""
     acceleration, slowest = USUAL[other.motion]
@@ -167,7 +167,7 @@ def test_missions_hold_the_run_up_and_the_run_out(other: PlanRun) -> None:
         step_s = abs(path.time_s[k] - path.time_s[k + 1 if k < 0 else 0])
         speed = float(np.linalg.norm(inside - end)) / step_s
         gain = min(acceleration, 0.5 * most)
-        long_m = (speed**2 - (slowest * most) ** 2) / (1.2 * gain)
+        long_m = (speed**2 - (slowest * most) ** 2) / (2.0 * gain)
         if slowest:
             radii = speed / (0.75 * omega), speed**2 / (0.8 * gain), most / omega
             long_m = max(long_m, 2.0 * max(radii))

@@ -21,7 +21,6 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.planning.aims import beside
-from syncline_design.planning.approach import approach
 from syncline_design.planning.beyond import BeyondFirst
 from syncline_design.planning.information import (
     Unknown,
@@ -225,10 +224,11 @@ class World:
             now,
             once,
             twice,
-            _swept(path) if leg.begins_mps is None else _with_approach(vehicle, leg),
+            _swept(path),
             float(path.euler_rad[-1, 2]),
             turns_s,
             self._rooms[leg.stage],
+            _runs_m(vehicle, leg, path),
         )
 
     @cached_property
@@ -242,7 +242,6 @@ class World:
                 tuple(
                     _swept(travelled(one, transition(one, QUARTER_RAD * k))) for k in range(-2, 3)
                 ),
-                one.run_m(one.join_mps),
             )
             for one in self.vehicles
         )
@@ -264,20 +263,15 @@ def _swept(path: PathStates) -> Swept:
     return Swept((north_m, east_m), (south, north, west, east))
 
 
-def _with_approach(vehicle: Vehicle, leg: Leg) -> Swept:
-    """What a leg that is a drive of its own takes, with the way straight on to it, and what it
-    takes to gain its speed and to lose it."""
-    begun = transition(vehicle, 0.0, leg.begins_mps)
-    path = travelled(vehicle, joined([begun, leg.course]))
-    places = (
-        np.vstack([path.position_m, *approach(vehicle, path).places_m])[:, :2]
-        - path.position_m[len(begun), :2]
-    )
-    (south, west), (north, east) = (
-        tuple(map(float, of(places, axis=0))) for of in (np.min, np.max)
-    )
-    north_m, east_m = (float(v) for v in places[len(path.time_s) - 1])
-    return Swept((north_m, east_m), (south, north, west, east))
+def _runs_m(vehicle: Vehicle, leg: Leg, path: PathStates) -> tuple[float, float]:
+    """Run-up and run-out of a drive that one leg begins and ends.
+
+    Where a leg begins at a speed of its own, the way straight on to it is that much longer.
+    """
+    begins = vehicle.join_mps if leg.begins_mps is None else leg.begins_mps
+    ends = float(np.linalg.norm(path.velocity_mps[-1, :2]))
+    further_m = (begins - vehicle.join_mps) * transition(vehicle, 0.0, begins).duration_s
+    return vehicle.run_m(begins) + max(further_m, 0.0), vehicle.run_m(ends)
 
 
 def _since(time_s: Array, ends: Sequence[int]) -> Array:

@@ -59,14 +59,10 @@ STILL: Final = Swept()
 @dataclass(frozen=True, slots=True)
 class Room:
     """Where a vehicle has to stay: north and east extent [m], and what its turns to a leg take, by
-    -2 to 2 quarters.
-
-    run_m: what it takes to gain the speed that legs begin at, and to lose it.
-    """
+    -2 to 2 quarters."""
 
     area_m: Place
     turns: tuple[Swept, ...]
-    run_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +83,8 @@ class LegTold:
 
     swept: of the leg driven northwards; turned_rad: its net turn.  turns_s: time to the leg
     straight on, and after a turn about; infinite where it can only be driven straight on.  room:
-    None where the vehicle may go anywhere; what its turns take is not looked at then.
+    None where the vehicle may go anywhere; what its turns take is not looked at then.  runs_m: the
+    run-up before a drive that it begins, and the run-out after one that it ends.
     """
 
     leg: Leg
@@ -98,14 +95,9 @@ class LegTold:
     turned_rad: float
     turns_s: tuple[float, float]
     room: Room | None = None
+    runs_m: tuple[float, float] = (0.0, 0.0)
 
     _known: dict[float, tuple[Way, ...]] = field(default_factory=dict, repr=False, compare=False)
-
-    @property
-    def run_m(self) -> float:
-        """The run-up before a drive that it begins, and the run-out after one that it ends; of one
-        that is a drive of its own, both are in what it takes."""
-        return 0.0 if self.room is None or self.leg.begins_mps is not None else self.room.run_m
 
     @property
     def area_m(self) -> Place | None:
@@ -176,7 +168,7 @@ class LegsEnd:
     heading now, and when; box_m: what they took on their way, south, north, west and east.
 
     A drive begins straight ahead, northwards: the way back is north where nothing was driven.
-    run_m: the run-out, straight on from there.
+    run_m: the run-out, straight on from there; run_up_m: the run-up before its begin.
     """
 
     place_m: Place = (0.0, 0.0)
@@ -185,6 +177,7 @@ class LegsEnd:
     end_s: float = 0.0
     box_m: Box = (0.0, 0.0, 0.0, 0.0)
     run_m: float = 0.0
+    run_up_m: float = 0.0
 
     def then(self, told: LegTold) -> tuple[Placed, LegsEnd]:
         """One more leg, at the heading that ends nearest to the start, the way back first; within
@@ -212,28 +205,35 @@ class LegsEnd:
     def extent_m(self) -> Place:
         """North to south and east to west that was taken [m], with the turns between the legs, the
         run-up and the run-out."""
-        (north, east), run_m = self.place_m, self.run_m
-        out = (
-            north + run_m * math.cos(self.heading_rad),
-            east + run_m * math.sin(self.heading_rad),
+        north, east = self.place_m
+        run_up: Place = (-self.run_up_m, 0.0)
+        run_out = (
+            north + self.run_m * math.cos(self.heading_rad),
+            east + self.run_m * math.sin(self.heading_rad),
         )
-        south, north, west, east = around(self.box_m, out, STILL.box_m)
-        return north - south, east - west
+        return _extent(around(around(self.box_m, run_up, STILL.box_m), run_out, STILL.box_m))
 
     def within(self, area_m: Place | None) -> bool:
-        """Whether what was taken leaves some room at the edges of an area."""
+        """Whether the drive leaves some room at the edges of an area, which a run-up and a run-out
+        may take."""
         return area_m is None or all(
-            own <= AREA_SHARE * most for own, most in zip(self.extent_m, area_m, strict=True)
+            own <= AREA_SHARE * most and whole <= most
+            for own, whole, most in zip(_extent(self.box_m), self.extent_m, area_m, strict=True)
         )
 
     def _placed(self, told: LegTold, way: Way) -> tuple[Placed, LegsEnd]:
         placed = Placed(told, way.heading, way.turn_rad, self.end_s + way.turn_s)
         (north, east), (more, off) = self.place_m, way.swept.moved_m
         heading_rad = QUARTER_RAD * way.heading + told.turned_rad
-        before = self.box_m if self.end_s else (-told.run_m, 0.0, 0.0, 0.0)
-        box = around(before, self.place_m, way.swept.box_m)
+        box = around(self.box_m, self.place_m, way.swept.box_m)
         return placed, LegsEnd(
-            (north + more, east + off), way.heading, heading_rad, placed.end_s, box, told.run_m
+            (north + more, east + off),
+            way.heading,
+            heading_rad,
+            placed.end_s,
+            box,
+            told.runs_m[1],
+            self.run_up_m if self.end_s else told.runs_m[0],
         )
 
 
@@ -252,6 +252,11 @@ def way_of(sequence: Sequence[LegTold]) -> LegsEnd:
     for told in sequence:
         way = way.then(told)[1]
     return way
+
+
+def _extent(box: Box) -> Place:
+    south, north, west, east = box
+    return north - south, east - west
 
 
 def _turned(moved: Place, heading: int) -> Place:

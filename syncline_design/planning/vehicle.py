@@ -122,10 +122,9 @@ class Vehicle:
         return max(usual, slope / (TURN_SHARE * self.omega_max_radps))
 
     def gaining_m(self, speed_mps: float) -> float:
-        """Way from the slowest speed v0 to another, or back: (v^2 - v0^2) / (2 a) [m], a the share
-        ALONG of the acceleration."""
-        gained = max(speed_mps**2 - self.slowest_mps**2, 0.0)
-        return gained / (2.0 * ALONG * self.acceleration_mps2)
+        """Way from the slowest speed v0 to another, or back: (v^2 - v0^2) / (2 a) [m]; straight on,
+        so that all of the acceleration is for it."""
+        return max(speed_mps**2 - self.slowest_mps**2, 0.0) / (2.0 * self.acceleration_mps2)
 
     def run_m(self, speed_mps: float) -> float:
         """Way straight on before a drive that begins at a speed, and after one that ends at it.
