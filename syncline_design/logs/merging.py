@@ -63,12 +63,16 @@ def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
             continue
         taken = {k: v for k, v in table.columns.items() if k not in columns and k != TIME}
         twice = sorted(shown(k) for k in table.columns if k in columns and k != TIME)
+        if twice and _apart(base, table):
+            raise _unlike_parts(base, table)
         if base.columns.keys() <= table.columns.keys():
             raise refuse(
                 table.path,
                 "it tells nothing that the files before it do not tell",
-                expected="files that are parts of one run, each with columns of its own",
-                found=f"a second log of {len(twice)} columns that are in {base.path.name} already",
+                expected="files that are parts of one run, each with columns of its own, or with "
+                "the same columns one after the other in time",
+                found=f"a second log of {len(twice)} columns that are in {base.path.name} already, "
+                f"{_stamps(table)}, beside {_stamps(base)}",
                 hint="several runs of one system are taken together by `diagnose --joint`",
             )
         if twice:
@@ -87,13 +91,40 @@ def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
                 field=TIME,
                 expected=f"stamps between {to_places(stamps[0], 3)} and "
                 f"{to_places(stamps[-1], 3)} s",
-                found=f"{to_places(table.columns[TIME][0], 3)} to "
-                f"{to_places(table.columns[TIME][-1], 3)} s",
+                found=_stamps(table),
                 hint="are both files on the same time scale?",
             )
     table = replace(base, columns=columns, notes=tuple(notes))
     theirs = _velocity_of_reference([base, *tables], prefixes[0])
     return Merged(table, tracks, follows is not None, theirs)
+
+
+def _apart(one: LogTable, other: LogTable) -> bool:
+    """Whether one file ends before the other begins."""
+    a, b = one.columns[TIME], other.columns[TIME]
+    return bool(a[-1] < b[0] or b[-1] < a[0])
+
+
+def _stamps(table: LogTable) -> str:
+    own = table.columns[TIME]
+    return f"{to_places(own[0], 3)} to {to_places(own[-1], 3)} s"
+
+
+def _unlike_parts(base: LogTable, table: LogTable) -> Exception:
+    """Of files that follow one another in time, and share some columns and not all."""
+    lacks = sorted(shown(n) for n in base.columns.keys() - table.columns.keys())
+    more = sorted(shown(n) for n in table.columns.keys() - base.columns.keys())
+    told = [f"without {', '.join(lacks)}"] if lacks else []
+    told += [f"with {', '.join(more)} besides"] if more else []
+    return refuse(
+        table.path,
+        f"its columns differ from those of {base.path.name}, one after the other in time",
+        line=1,
+        column=1,
+        expected="the same columns in every part of one run",
+        found=f"{_stamps(table)}, {', '.join(told)}",
+        hint="leave the parts out that lack columns, or leave these columns out of all",
+    )
 
 
 def _needs_velocity(tables: Sequence[LogTable], prefix: str) -> LogTable | None:

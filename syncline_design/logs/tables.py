@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from syncline_design.logs.row_source import NANOSECONDS, Clock, Mask, RowSource
 from syncline_design.logs.runs import demand_one_run
 from syncline_design.logs.sources import opened
 from syncline_design.logs.surveys import Survey, has_places, is_survey, joined, survey_of
+from syncline_design.logs.table_parts import TableParts, in_turn, parts_of
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_estimate
 from syncline_design.model.quantity import si_name, suffix_unit
@@ -35,6 +37,8 @@ from syncline_design.spec.load import BadInput
 
 DAY = 86_400 * NANOSECONDS
 UNLIKE = 0.002  # rad, or share of the usual figure, by which a quantity given twice differs
+CUT_OFF = "cut off in the last row"
+CALENDAR = "calendar"  # files whose times are a calendar's, and no parts of those that count
 Slip = tuple[Sequence[str], float]  # files with one of these columns have stamps ahead by so much
 
 
@@ -87,7 +91,7 @@ def read_tables(
     sources = [one for one in sources if one.path not in surveyed]
     files = [_opened(source, mapping, stages) for source in sources]
     known = {name for one in surveys for name in one.header}
-    files = _on_one_scale(_with_absent(files, mapping, known))
+    files = _one_run(_on_one_scale(_with_absent(files, mapping, known)))
     names, ahead_s = slip
     stamps = [
         f.seconds - ahead_s if ahead_s and any(n in f.found for n in names) else f.seconds
@@ -220,6 +224,39 @@ def _on_one_scale(files: list[_Open]) -> list[_Open]:
     return [replace(moved[0], notes=(*moved[0].notes, note)), *moved[1:]]
 
 
+def _one_run(files: Sequence[_Open]) -> list[_Open]:
+    """The files, those that are parts of one run as one."""
+
+    def span(k: int) -> tuple[float, float]:
+        stamps = arranged(files[k].source.path, files[k].seconds).stamps
+        return float(stamps[0]), float(stamps[-1])
+
+    kinds = [frozenset(one.found) | ({CALENDAR} if one.day is not None else set()) for one in files]
+    groups = in_turn(kinds, cache(span))
+    return [
+        files[group[0]] if len(group) == 1 else _joined([files[k] for k in group])
+        for group in groups
+    ]
+
+
+def _joined(parts: Sequence[_Open]) -> _Open:
+    """Parts of one run, in the order of time."""
+    first = parts[0]
+    seconds = [one.seconds for one in parts]
+    source = TableParts([one.source for one in parts], [one.found for one in parts], seconds)
+    names = ", ".join(one.source.path.name for one in parts)
+    notes = dict.fromkeys(note for one in parts for note in one.notes)
+    headers = [one.source.header for one in parts]
+    twice = tuple(pair for pair in first.rivals if all(pair[0] in one for one in headers))
+    return replace(
+        first,
+        source=source,
+        seconds=np.concatenate(seconds),
+        notes=(*notes, f"parts of one run, in the order of time: {names}"),
+        rivals=twice,
+    )
+
+
 def _unlike(file: _Open, keep: Mask, place: Array, columns: Mapping[str, Array]) -> Iterator[str]:
     """What to say of a quantity that is given twice and not alike."""
     for name, si in file.rivals:
@@ -260,11 +297,12 @@ def _table(file: _Open, rows: Arranged) -> LogTable:
         demand_one_run(file.source.path, columns, rows.order, rows.pieces)
     rejected, notes, count = dict(rows.rejected), [*file.notes, *rows.notes], rows.rows
     notes += _unlike(file, keep, place, columns)
-    if file.source.cut:
-        rejected["cut off in the last row"] = 1
-        count += 1
-        line = f"{file.source.path.name} is cut off in line {file.source.cut}"
-        notes.append(f"{line}; the rows before it are used")
+    for part in parts_of(file.source):
+        if part.cut:
+            rejected[CUT_OFF] = rejected.get(CUT_OFF, 0) + 1
+            count += 1
+            line = f"{part.path.name} is cut off in line {part.cut}"
+            notes.append(f"{line}; the rows before it are used")
     return LogTable(
         file.source.path,
         columns,
