@@ -14,7 +14,7 @@ from syncline_design.diagnosis.candidates import Candidate, Signature
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.instead import InQuestion, others_in_place
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
-from syncline_design.diagnosis.pairs import promising
+from syncline_design.diagnosis.pairs import in_the_place, promising
 from syncline_design.diagnosis.scores import Gram, gram
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.effects import registry
@@ -34,6 +34,18 @@ def drive(seed: int, nearly: float) -> tuple[Array, Array, Array, Array]:
     delay, own, noise = (rng.standard_normal(600) for _ in range(3))
     arm = -delay + nearly * rng.standard_normal(600)
     return delay, arm, own, noise
+
+
+def test_nothing_stands_in_the_place_of_what_has_no_signature() -> None:
+    """A line of the spectrum, of half a second of late angles: it ended in a traceback."""
+    signs = [
+        Signature(named("latency", sensor), {}, np.zeros((60, 3, 1)))
+        for sensor in ("position", "attitude", "ranging")
+    ]
+    groups = tuple(slice(k, k + 1) for k in range(3))
+    scored = [(object(), Gram(np.ones(3), np.eye(3), groups, 0.0))]
+    assert in_the_place(scored, signs, ("spectral_line", "ranging", 0)) == []  # type: ignore[arg-type]
+    assert in_the_place(scored, signs, ("latency", "ranging", 0))  # type: ignore[arg-type]
 
 
 def test_what_two_save_together_is_that_of_least_squares() -> None:

@@ -64,9 +64,12 @@ def in_the_place(
 ) -> list[Promising]:
     """Pairs that save about as much as the one effect of a label, or more; the best first.
 
-    scores: of all in `free`, that effect among them, where it is taken out of the model.
+    scores: of all in `free`, that effect among them, where it is taken out of the model.  A wave or
+    a line of a spectrum was sought by its frequency and is not: no two departures stand for it.
     """
     alone = [k for k, s in enumerate(free) if s.candidate.label == label]
+    if not alone:
+        return []
     pairs = [one for one in _pairs(free) if all(free[k].candidate.label != label for k in one)]
     best: dict[tuple[int, int], tuple[float, NoiseLevel]] = {}
     for level, gram in scores:
