@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -120,3 +121,17 @@ def test_a_key_that_is_not_there_is_not_read_as_one() -> None:
     assert read_as(DiagnosisAndDesign, json.dumps(data | {"added_later": 1})).verdict == "agrees"
     with pytest.raises(ValueError, match="remaining"):
         read_as(DiagnosisAndDesign, json.dumps(data | {"remaining": "nothing"}))
+
+
+def test_a_log_that_differs_more_than_white_noise_agrees_as_far_as_it_can_tell() -> None:
+    """A constant of three standard deviations in a short log may be slow noise: 1.4 times."""
+    agreed = clean()
+    assert agreed.gap.held_out is not None
+    assert agreed.gap.expected_rms_m is not None
+    assert on_diagnosis(agreed).outcome.tone == "good"
+    large = replace(agreed.gap.held_out.after, rms_m=1.4 * agreed.gap.expected_rms_m)
+    gap = replace(agreed.gap, held_out=replace(agreed.gap.held_out, after=large))
+    told = on_diagnosis(replace(agreed, gap=gap))
+    assert told.outcome.tone == "warn"
+    assert "1.4 times what white noise of the spec's size makes" in told.outcome.word
+    assert any("slow noise" in str(one) for one in told.sentences)

@@ -146,10 +146,23 @@ def outcome_of(found: Diagnosis) -> Outcome:
     if found.joint is not None and found.joint.unlike:
         return _unlike_outcome(found.joint.unlike)
     known, times = DIAGNOSES[found.verdict], _times_expected(found.gap)
+    if _maybe_slow(found):
+        return Outcome(
+            "warn",
+            "!",
+            f"Agrees as far as this log can tell: {numbers.number(times, 2)} times what white "
+            "noise of the spec's size makes, as slow noise of that size can",
+        )
     if found.verdict != "explained" or times <= LARGE:
         return known
     more = f"{known.word}, {numbers.number(times, 2)} times what the spec expects"
     return Outcome(known.tone, known.mark, more)
+
+
+def _maybe_slow(found: Diagnosis) -> bool:
+    """Whether the log agrees, though it differs by more than white noise of the spec's makes."""
+    large = _times_expected(found.gap) > LARGE
+    return found.verdict == "agrees" and large and not found.findings
 
 
 def _unlike_outcome(unlike: Sequence[UnlikeOthers]) -> Outcome:
@@ -180,7 +193,12 @@ def _found_text(found: Diagnosis) -> str:
     said = [full_stop(called(one)) for one in named]
     said += [full_stop(line) for line in noise_lines(found.findings)]
     if not said and not found.remaining.material:
-        said = ["Nothing beyond the spec's own noise was found."]
+        slow = _maybe_slow(found)
+        said = [
+            "Nothing was found that slow noise of the spec's size could not make."
+            if slow
+            else "Nothing beyond the spec's own noise was found."
+        ]
     if not named and found.remaining.material:
         said.append("No effect of the dictionary explains what differs.")
     return " ".join([*said, left_text(found.remaining)]).strip()
