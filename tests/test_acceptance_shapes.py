@@ -12,6 +12,7 @@ import pytest
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_log import by_log
+from syncline_design.comparison.departing import amount
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
@@ -251,6 +252,14 @@ def test_a_delay_on_top_of_a_word_for_a_drift_has_the_room_of_both(found: Diagno
     assert row.measured is not None
     assert row.measured.low == pytest.approx(0.010)
     assert row.measured.high == pytest.approx(0.014 + 4e-4 * lasts_s)
-    assert row.words.endswith(word.sentence)
+    assert word.sentence in row.words
+    largest_s = 0.012 + 3e-4 * lasts_s
+    assert row.measured.value == pytest.approx(largest_s)
+    assert row.words.endswith(f"in all up to {amount(largest_s, 's')}")
+    later = replace(word, from_s=95.0, to_s=None)  # the 12 ms are over by then
+    alone = beside_shapes(one, said, replace(log, found=replace(told, findings=(later,))),
+                          signed=True)  # fmt: skip
+    assert alone.measured is not None
+    assert alone.measured.value == pytest.approx(0.012)
     other = row_of("ranging", "latency")
     assert beside_shapes(other, said, log, signed=True) is said
