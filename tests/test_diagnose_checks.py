@@ -119,6 +119,16 @@ def test_columns_of_a_chain_that_contradict_it_are_said(tmp_path: Path) -> None:
     assert (check.stage, check.value) == ("auv", pytest.approx(1.3, rel=0.02))
 
 
+def test_a_later_stage_without_a_velocity_is_told_why_it_needs_one(tmp_path: Path) -> None:
+    def dropped(columns: dict[str, Array]) -> None:
+        for name in [n for n in columns if n.startswith("auv_velocity_")]:
+            del columns[name]
+
+    log = make_log(scenario("survey_chain", 3, 20.0, 5.0))
+    with pytest.raises(BadInput, match="only the first stage of a chain has places"):
+        checked(written(log, tmp_path, dropped))
+
+
 def late(stem: str, by_s: float) -> Change:
     def change(columns: dict[str, Array]) -> None:
         stamps = columns["time_s"]

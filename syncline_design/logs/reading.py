@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -165,7 +165,16 @@ def _demand_all_or_none(draft: _Draft, prefix: str) -> None:
         draft.notes.append(f"not in the log, so not compared: {', '.join(missing)}")
 
 
-def _missing(draft: _Draft, names: Sequence[str]) -> Exception:
+NAME_THEM: Final = (
+    "name them there, or map them in the spec: log: {columns: {roll_deg: theirs [rad]}}"
+)
+NO_PLACES: Final = (
+    "only the first stage of a chain has places to derive a velocity from: log this one's own (of "
+    "what is towed, the towing vehicle's is one), or map it: log: {columns: {...}}"
+)
+
+
+def _missing(draft: _Draft, names: Sequence[str], hint: str = NAME_THEM) -> Exception:
     listed = ", ".join(shown(n) for n in names)
     plural = "columns are" if len(names) > 1 else "column is"
     return refuse(
@@ -174,7 +183,7 @@ def _missing(draft: _Draft, names: Sequence[str]) -> Exception:
         line=1,
         column=1,
         found=", ".join(draft.table.header[:20])[:500] or "no columns",
-        hint="name them there, or map them in the spec: log: {columns: {roll_deg: theirs [rad]}}",
+        hint=hint,
     )
 
 
@@ -265,6 +274,6 @@ def _velocity(
         draft.notes.append(f"velocity of {name} was derived from the reference positions")
         return derived_velocity(time_s, reference), "reference"
     if antenna is None:
-        raise _missing(draft, [prefix + n for n in VELOCITY])
+        raise _missing(draft, [prefix + n for n in VELOCITY], NO_PLACES)
     draft.notes.append(f"velocity of {name} was derived from its own positions, smoothed over 1 s")
     return derived_velocity(time_s, antenna), "position"
