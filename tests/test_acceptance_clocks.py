@@ -78,7 +78,7 @@ def test_clock_logs_against_the_clock_of_the_spec(
     assert {one["read_as"] for one in result["evidence"]} == {"clock"}
 
 
-@pytest.mark.parametrize("good", [0, 1, 19, 200])
+@pytest.mark.parametrize("good", [0, 1, 19, 60])
 @pytest.mark.parametrize("kind", ["tracking", "ptp4l"])
 def test_a_session_beyond_the_bound_is_broken_however_many_good_ones_lie_beside_it(
     clocked: Path, good: int, kind: str
