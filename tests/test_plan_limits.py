@@ -128,6 +128,22 @@ def test_effects_that_look_alike_are_told_apart_where_one_is_large(
     assert "Correlation of the pair 1 " not in words
 
 
+def test_of_an_arm_each_component_has_its_own_size(car: Path) -> None:
+    """On the level an arm's height is one with the datum's, and the others are told in a few turns:
+    an arm of such a size along one axis is told when that is stated."""
+    arm, datum = "lever_arm(position)", "datum_offset(target)"
+    unsized = planned_alone(car, arm, datum)
+    sizes = unsized.result.pairs[0].told_from or {}
+    assert {"x_m", "y_m"} <= set(sizes)
+    assert sizes.get("z_m", math.inf) > 20.0 * max(sizes["x_m"], sizes["y_m"])
+    words = " ".join(render_plan("markdown", unsized).split())
+    assert f"From x {1e3 * sizes['x_m']:.3g} mm or y" in words
+    for stated in (f"[{1.05 * sizes['x_m']} m, 0 m, 0 m]", f"[0 m, {1.05 * sizes['y_m']} m, 0 m]"):
+        found = planned_alone(car, f"{arm}={stated}", datum).result
+        assert found.reached
+        assert found.duration_s <= unsized.result.duration_s + 1.0
+
+
 def test_a_copter_with_a_turning_radius_is_planned_for(tmp_path: Path) -> None:
     """It does not turn on the spot then, and none of its turns is tighter."""
     path = spec_with(

@@ -47,8 +47,8 @@ class Separated(Record):
 
     noncentrality: twice the log likelihood by which the true effect, of the size stated, beats its
     rival refitted, on average; sizes: of the first effect's parameters, SI.  told_from: of a pair
-    that is not told apart and whose size is not known, the sizes from which this drive tells it, to
-    first order, where they are plausible.
+    that is not told apart and whose size is not known, the sizes of each parameter alone from which
+    this drive tells it, to first order, where they are plausible.
     """
 
     first: str

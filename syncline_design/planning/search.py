@@ -40,6 +40,7 @@ from syncline_design.planning.placing import (
 from syncline_design.planning.wanted import Goal, PairGoal
 
 NONCENTRALITY: Final = 60.0  # at which a rival fits worse by more than 15 nat nine times in ten
+LEAST_SEEN: Final = 1e-9  # of a parameter's information, below which a rival makes all of it
 SAME: Final = 0.99  # correlation above which two effects stay one class
 MOST_LEGS: Final = 240
 MARGIN: Final = 0.95  # of what is asked that a search aims at first, for the joints between legs
@@ -177,15 +178,18 @@ def noncentrality_of(information: Array, pair: PairGoal) -> float:
 
 
 def told_from(information: Array, pair: PairGoal) -> Array | None:
-    """Sizes of the effect named first from which it is told apart, where its size is not known.
+    """Sizes of the effect named first, each parameter alone, from which it is told apart, where its
+    size is not known; infinite for what is never told.
 
-    To first order the noncentrality grows with the square of the size, so that two effects whose
-    correlation makes them one class are told apart all the same where one is large.
+    To first order the noncentrality of one of size v is v^2 (G_AA - G_AB G_BB^-1 G_BA)_kk, so that
+    two effects whose correlation makes them one class are told apart all the same where one is
+    large.
     """
     if pair.known:
         return None
-    found = noncentrality(information, pair.first, pair.second, pair.sizes)
-    return pair.sizes * math.sqrt(NONCENTRALITY / found) if found > 0.0 else None
+    alone = np.diag(schur(information, pair.first, pair.second))
+    seen = alone > LEAST_SEEN * np.diag(information)[list(pair.first)]
+    return np.where(seen, np.sqrt(NONCENTRALITY / np.where(seen, alone, 1.0)), np.inf)
 
 
 @dataclass(slots=True)

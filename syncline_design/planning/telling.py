@@ -187,10 +187,11 @@ class Telling:
         names = [one.name for one in own]
         apart = pair_ratio(information, pair) <= 1.0
         larger = None if apart else told_from(information, pair)
-        if larger is not None and any(
-            size > one.high for one, size in zip(own, larger, strict=True)
-        ):
-            larger = None
+        plausible = {
+            one.name: float(size)
+            for one, size in zip(own, () if larger is None else larger, strict=larger is not None)
+            if size <= one.high
+        }
         return Separated(
             *pair.names,
             canonical_correlation(information, pair.first, pair.second),
@@ -198,7 +199,7 @@ class Telling:
             NONCENTRALITY,
             apart,
             dict(zip(names, map(float, pair.sizes), strict=True)),
-            None if larger is None else dict(zip(names, map(float, larger), strict=True)),
+            plausible or None,
         )
 
     def _confused(self, information: Array) -> tuple[str, ...]:

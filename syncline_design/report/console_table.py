@@ -7,7 +7,7 @@ from itertools import zip_longest
 from textwrap import wrap
 from typing import Final
 
-from syncline_design.report.table import CORNER, Table, Tone, cell_words
+from syncline_design.report.table import CORNER, Cell, Table, Tone, cell_words
 from syncline_design.report.text import unbroken, visible
 
 GAP: Final = "  "
@@ -34,7 +34,7 @@ def folded(text: str, width: int, first: str = "", indent: str = "") -> list[str
 def fitted(table: Table, room: int, paint: Paint | None = None) -> Iterator[str]:
     """The lines of a table without its caption, none longer than `room` where words allow it."""
     heads = [head.text for head in table.heads]
-    rows = [[unbroken(cell_words(cell)) for cell in row] for row in table.rows]
+    rows = [[_marked(cell) for cell in row] for row in table.rows]
     widths = _widths(heads, rows, room)
     if widths is None:
         yield from _records(heads, rows, room)
@@ -43,6 +43,12 @@ def fitted(table: Table, room: int, paint: Paint | None = None) -> Iterator[str]
     yield from _row(heads, [""] * len(heads), widths, right, paint)
     for cells, row in zip(rows, table.rows, strict=True):
         yield from _row(cells, [cell.tone for cell in row], widths, right, paint)
+
+
+def _marked(cell: Cell) -> str:
+    """A cell's words; its symbol stays with the first of them."""
+    words = unbroken(cell_words(cell))
+    return words.replace(" ", "\u00a0", 1) if cell.mark else words
 
 
 def _widths(heads: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[int] | None:

@@ -84,6 +84,16 @@ def duration(seconds: float) -> str:
     return typeset(format_duration(seconds))
 
 
+def drive_time(minutes: float) -> str:
+    """`5.3 s`, `2.8 min`, `130 min`, `12 h`."""
+    if minutes < 1.0:
+        return time(60.0 * minutes, 2)
+    if minutes >= 600.0:
+        return typeset(f"{places(minutes / 60.0, 0)} h")
+    shown = places(minutes, 0) if minutes >= 10.0 else number(minutes, 2)
+    return typeset(f"{shown} min")
+
+
 def from_to(from_s: float, to_s: float) -> str:
     """Two moments of a log, `120 s to 130 s`; to a hundredth of what lies between them at least."""
     between = abs(to_s - from_s)

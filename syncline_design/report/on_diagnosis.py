@@ -102,11 +102,11 @@ def _drive(found: Diagnosis) -> list[Node]:
     who = "This log" if found.joint is None else "These logs"
     if plan.minutes is None:
         return [Text((f"{plan.why_none}: ", code(plan.command)))]
-    length = numbers.typeset(f"{numbers.number(plan.minutes, 2)} min")
+    length = numbers.drive_time(plan.minutes)
     told = sentence_list([plan.second, *(plan.others or ())])
     words = f"{who} cannot tell {plan.first} from {told}. A drive of {length} does:"
     if not plan.reached:
-        least = numbers.typeset(f"{numbers.number(plan.least_minutes or plan.minutes, 2)} min")
+        least = numbers.drive_time(plan.least_minutes or plan.minutes)
         words = f"{who} cannot tell {plan.first} from {told}. It takes {least} of:"
     targets = f", over {plan.targets} surveyed targets" if plan.targets else ""
     more = f"Whole, with waypoints{targets}: "

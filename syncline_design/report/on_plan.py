@@ -77,7 +77,7 @@ def on_plan(run: PlanRun) -> Document:
 
 def _outcome(found: Plan) -> Outcome:
     legs = f"{len(found.legs)} leg{'s' if len(found.legs) != 1 else ''}"
-    length = _minutes(found.duration_s / 60.0)
+    length = numbers.drive_time(found.duration_s / 60.0)
     if found.reached:
         rest = ", but for what no drive tells" if found.inseparable else ""
         if found.calm is not None and not found.calm.reached:
@@ -103,7 +103,7 @@ def _sentences(found: Plan) -> Iterator[Inline]:
         given = f"{numbers.number(found.minutes, 6)} min"
         below = f"Below is the best for {given}."
         if found.duration_s > 60.0 * found.minutes:
-            length = _minutes(found.duration_s / 60.0)
+            length = numbers.drive_time(found.duration_s / 60.0)
             below = f"No drive as short as {given} was found: below is one of {length}."
         yield f"The least that is enough, of the drives looked at: {least}. {below}"
     if not found.reached and found.flown is not None and found.flown.reached:
@@ -131,7 +131,7 @@ def _sentences(found: Plan) -> Iterator[Inline]:
     if found.calm is not None:
         yield from _in_calm_water(found)
     for one in found.dear or ():
-        lasts, whole = (_minutes(s / 60.0) for s in (one.lasts_s, found.duration_s))
+        lasts, whole = (numbers.drive_time(s / 60.0) for s in (one.lasts_s, found.duration_s))
         yield f"Leg {one.leg} takes {lasts} of the {whole}. Without it {_lacking(one.without)}."
     yield from found.cautions or ()
 
@@ -200,10 +200,12 @@ def _larger(found: Plan) -> Separated | None:
 def _told_where_larger(one: Separated) -> Iterator[Inline]:
     """A pair of which only the size decides whether it can be told."""
     sizes = one.told_from or {}
+    each = [f"{split_suffix(name)[0]} {figure(name, size)}" for name, size in sizes.items()]
+    least = " or ".join(each) if len(one.sizes) > 1 else figure(*next(iter(sizes.items())))
     yield (
         f"{one.first} and {one.second} look nearly alike on every drive (correlation "
         f"{_correlation(one.correlation)}), so that a small effect is not told. From "
-        f"{' and '.join(figure(name, size) for name, size in sizes.items())} of the first on, the "
+        f"{least} of the first on, the "
         "drive below tells them apart. Where its size is known, --separate with "
         f"{one.first}=SIZE plans for it."
     )
@@ -217,19 +219,6 @@ def _correlation(value: float) -> str:
 def _how_far(found: Plan) -> str:
     """In which sense effects are not told apart."""
     return AT_SIZE if found.sized else FIRST_ORDER
-
-
-def _minutes(minutes: float) -> str:
-    """`5.3 s`, `2.8 min`, `130 min`, `12 h`."""
-    if minutes < 1.0:
-        return numbers.time(60.0 * minutes, 2)
-    if minutes >= 600.0:
-        return numbers.typeset(f"{numbers.places(minutes / 60.0, 0)} h")
-    return numbers.typeset(
-        f"{numbers.places(minutes, 0)} min"
-        if minutes >= 10.0
-        else f"{numbers.number(minutes, 2)} min"
-    )
 
 
 def _least(minutes: float) -> str:
@@ -375,7 +364,7 @@ def _standard_row(
     minutes: float | None, keys: list[str],
 ) -> tuple[Cell | str, ...]:  # fmt: skip
     sizes = _column_sizes(found)
-    reached = Cell("never" if minutes is None else _minutes(minutes),
+    reached = Cell("never" if minutes is None else numbers.drive_time(minutes),
                    _sort(minutes))  # fmt: skip
     return (
         name,

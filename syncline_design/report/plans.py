@@ -285,7 +285,8 @@ def _reversed(run: PlanRun, ways: list[tuple[int, int]], yaw: Any) -> Iterator[t
 
 
 def _place(place: Any, height_m: float) -> list[float]:
-    return [round(float(place[0]), 9), round(float(place[1]), 9), round(float(height_m), 3)]
+    figures = (round(float(place[0]), 9), round(float(place[1]), 9), round(float(height_m), 3))
+    return [one + 0.0 for one in figures]  # no -0.0
 
 
 def _item(command: int, params: list[Any], frame: int = RELATIVE) -> dict[str, Any]:
