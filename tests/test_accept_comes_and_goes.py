@@ -18,9 +18,15 @@ from syncline_design.diagnosis.built import _seen as seen_in
 from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.run import SearchedLog
+from syncline_design.diagnosis.run import _slip as slip_of
 from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.search import SearchResult
+from syncline_design.diagnosis.spans import StampSpan
 from syncline_design.diagnosis.stretches import stretches
 from syncline_design.diagnosis.system import measured
+from syncline_design.effects import plain_delay
+from syncline_design.effects.acting import Acting
+from syncline_design.effects.record import Effect
 from syncline_design.logs.log import Log
 from syncline_design.model.system import System
 from syncline_design.spec.load import load
@@ -98,7 +104,7 @@ def _of(spec: Path, log: Path) -> tuple[System, Log]:
     return inputs.system, inputs.log
 
 
-@pytest.mark.parametrize(("size_s", "lasts_s"), [(0.2, 1.5), (0.5, 8.0)])
+@pytest.mark.parametrize(("size_s", "lasts_s"), [(0.2, 1.5), (0.5, 8.0), (1.0, 10.0)])
 def test_a_large_delay_for_a_while_is_sized_and_no_arm(
     size_s: float, lasts_s: float, tmp_path: Path
 ) -> None:
@@ -117,6 +123,22 @@ def test_a_large_delay_for_a_while_is_sized_and_no_arm(
     assert row.measured.high - row.measured.low < 0.2 * size_s
     assert told.groups == ()
     assert rows["position", "lever_arm"].status != "broken"
+
+
+@pytest.mark.parametrize("seconds", [1.0, -2.0])
+def test_whole_seconds_of_a_while_are_put_back_in_none_of_the_log(seconds: float) -> None:
+    """1 s for 10 s was undone everywhere, and the rest of the log was a second early."""
+    whole = plain_delay()
+
+    def put_back(effect: Effect) -> Acting | None:
+        one = Acting(effect, "position", 0, {effect.parameters[0].name: seconds})
+        model = SimpleNamespace(acting=(one,), covariance=np.array([[1e-6]]))
+        return slip_of(cast(SearchResult, SimpleNamespace(model=model)))
+
+    assert put_back(StampSpan(whole, 20.0, 30.0).cut) is None
+    slip = put_back(whole)
+    assert slip is not None
+    assert list(slip.values.values()) == [seconds]
 
 
 def test_angles_that_are_late_for_a_while_turn_nothing(tmp_path: Path) -> None:

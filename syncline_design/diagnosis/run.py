@@ -63,6 +63,7 @@ from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress
 from syncline_design.diagnosis.shared_stamps import with_shared_stamps
 from syncline_design.diagnosis.shown_noise import with_shown_noise
 from syncline_design.diagnosis.sight import informative, smallest_seen
+from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.survey import survey_m
 from syncline_design.diagnosis.system import Measured, measured, pinned_system
 from syncline_design.diagnosis.system_delay import with_system_delay
@@ -365,10 +366,13 @@ def prepared(inputs: Measured, log: Log, exclude: Sequence[str] = ()) -> Data:
 
 
 def _slip(result: SearchResult) -> Acting | None:
-    """A position latency of whole seconds: the rows are paired anew, which is more exact."""
+    """A position latency of whole seconds: the rows are paired anew, which is more exact.
+
+    None of a stretch: put back in all of the log, all other rows would be as much off.
+    """
     at = 0
     for one in result.model.acting:
-        if one.effect.slopes():
+        if one.effect.slopes() and span_of(one.effect) is None:
             spread = float(np.sqrt(max(result.model.covariance[at, at], 0.0)))
             slip = whole_seconds(one, spread)
             if slip is not None:
