@@ -32,7 +32,8 @@ SignaturePair = tuple[Signature, Signature]
 
 @dataclass(frozen=True, slots=True)
 class Promising:
-    """Two signatures, the noise level under which they save most, and log p of that by chance."""
+    """Two signatures, the noise level under which they save most, and log p of that by chance; of
+    two in the place of one, less what they save more than that [nat] in its stead."""
 
     pair: SignaturePair
     level: NoiseLevel

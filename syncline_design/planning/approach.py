@@ -25,7 +25,7 @@ LEAST_M: Final = 0.05  # shorter, it is none
 class Approach:
     """Where the run-up begins and where the run-out ends (3,) [m]; None where there is none.
 
-    begins_mps, ends_mps: the speeds over ground that the drive begins and ends at.
+    begins_mps: the speed over ground that the drive begins at.
     """
 
     begins_mps: float
