@@ -14,8 +14,10 @@ import pytest
 
 from benchmarks.accept_world import MOTIONS, Drive, Fault, write
 from syncline_design.comparison.accept import AcceptSettings, accept
+from syncline_design.diagnosis.built import _as_built as as_built
 from syncline_design.diagnosis.built import _seen as seen_in
 from syncline_design.diagnosis.episodes import Episode, with_episodes
+from syncline_design.diagnosis.fitting import fit
 from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.run import SearchedLog
 from syncline_design.diagnosis.run import _slip as slip_of
@@ -24,7 +26,7 @@ from syncline_design.diagnosis.search import SearchResult
 from syncline_design.diagnosis.spans import StampSpan
 from syncline_design.diagnosis.stretches import stretches
 from syncline_design.diagnosis.system import measured
-from syncline_design.effects import plain_delay
+from syncline_design.effects import plain_delay, registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.logs.log import Log
@@ -181,6 +183,43 @@ def test_a_delay_that_was_taken_for_louder_noise_is_a_delay(tmp_path: Path) -> N
     first = seen_in(cast(SearchedLog, one)).stands[0]
     assert (first.label, first.sure) == (("latency", "attitude", 0), True)
     assert first.values[0] == pytest.approx(0.25, rel=0.05)
+
+
+@pytest.mark.parametrize("what", ["arm", "stamps"])
+def test_an_arm_that_changed_once_is_no_step_of_the_stamps(what: str, tmp_path: Path) -> None:
+    """A search that asks for what acts in all of a log first takes 30 cm from 60 s on for a step
+    of the stamps; a step it leaves alone."""
+    drive = Drive("launch", "errands", "white", 5, 100.0, 8.0)
+    off = Fault(arm_m={"ranging": (0.3, 0.0, 0.0)})
+    if what == "stamps":
+        off = Fault(late_s={"position": 0.1})
+    folders = [tmp_path / name for name in ("before", "after")]
+    for folder in folders:
+        folder.mkdir()
+    (spec, sound), (_, changed) = (write(drive, fault, folder)
+                                   for fault, folder in zip((Fault(), off), folders, strict=True)
+                                   )  # fmt: skip
+    lines, later = (log.read_text("utf-8").splitlines() for log in (sound, changed))
+    first = next(k for k in range(1, len(lines)) if float(lines[k].split(",")[0]) > 60.0)
+    sound.write_text("\n".join([*lines[:first], *later[first:]]) + "\n", "utf-8")
+    data, model, known = settled(spec, sound)
+    step = Acting(registry()["timestamp_step"], "position", 0, {"step_s": 0.05, "time_s": 60.0})
+    stepped = fit(data, (step,), model.opened, start=model.level)
+    search = SimpleNamespace(
+        proposals=SimpleNamespace(free_signatures=lambda _: known),
+        settings=SimpleNamespace(seed=0),
+    )
+    one = cast(SearchedLog, SimpleNamespace(data=data, search=search))
+    stands = as_built(one, stepped, ())
+    if what == "stamps":
+        assert stands == ()
+        return
+    (own,) = stands
+    assert {label[:2] for label in (own.label, *own.others)} >= {
+        ("lever_arm", "position"), ("lever_arm", "ranging"),
+    }  # fmt: skip
+    assert own.from_s == pytest.approx(60.0, abs=1.0)
+    assert math.hypot(*own.values) == pytest.approx(0.3, rel=0.1)
 
 
 def turned_from(log: Path, share: float, size_deg: float) -> Path:

@@ -127,6 +127,7 @@ def _seen(one: SearchedLog) -> Stretches:
     free = one.search.proposals.free_signatures(model)
     seed = one.search.settings.seed
     found = stretches(one.data, model, free, seed)
+    found = replace(found, stands=_as_built(one, model, found.stands))
     spans = [(each.from_s, each.to_s) for each in one.search.episodes or ()]
     if not spans:
         return found
@@ -134,6 +135,29 @@ def _seen(one: SearchedLog) -> Stretches:
     loud = [s for s in as_usual if _is_one_value(s) and any(_meet(s, *span) for span in spans)]
     rest = [s for s in found.stands if not any(_meet(s, each.from_s, each.to_s) for each in loud)]
     return replace(found, stands=(*loud, *rest))
+
+
+def _as_built(one: SearchedLog, model: Model, stands: tuple[Stands, ...]) -> tuple[Stands, ...]:
+    """What stands out, and what is built in and changed once where the search has stamps that step.
+
+    A step acts in all of a log by its one moment, so that the search takes it before an arm that is
+    off from then on, though that leaves far less.  Where the delay that it makes is not among what
+    fits there as well, it is none.
+    """
+    steps = [a for a in model.acting if any(p.located for p in a.effect.parameters)]
+    if not steps:
+        return stands
+    kept = tuple(a for a in model.acting if a not in steps)
+    undone = replace(model, acting=kept, error=one.data.error(kept))
+    free = one.search.proposals.free_signatures(undone)
+    delays = {(plain_delay().name, a.sensor, a.stage) for a in steps}
+    changed = [
+        s for s in stretches(one.data, undone, free, one.search.settings.seed).stands
+        if s.sure and not s.inside and not s.noise_of and not delays & {s.label, *s.others}
+        and not registry()[s.label[0]].passing
+    ]  # fmt: skip
+    rest = [s for s in stands if not any(_meet(s, each.from_s, each.to_s) for each in changed)]
+    return (*changed, *rest)
 
 
 def _apart(stands: tuple[Stands, ...]) -> tuple[Stands, ...]:
