@@ -14,7 +14,6 @@ import pytest
 
 from benchmarks.accept_world import MOTIONS, Drive, Fault, write
 from syncline_design.comparison.accept import AcceptSettings, accept
-from syncline_design.diagnosis.built import _as_built as as_built
 from syncline_design.diagnosis.built import _seen as seen_in
 from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.fitting import fit
@@ -172,7 +171,7 @@ def test_a_delay_that_was_taken_for_louder_noise_is_a_delay(tmp_path: Path) -> N
     sensor = next(w.sensor for w in data.structure.white if w.sensor[1] == "attitude")
     loud = Episode(sensor, at_s, at_s + 2.0, 60.0, 5.0, 100.0)
     search = SimpleNamespace(
-        proposals=SimpleNamespace(free_signatures=lambda _: known),
+        proposals=SimpleNamespace(free_signatures=lambda _: known, signatures=known),
         episodes=(loud,), settings=SimpleNamespace(seed=0),
     )  # fmt: skip
     louder = with_episodes(data, (loud,))
@@ -206,11 +205,12 @@ def test_an_arm_that_changed_once_is_no_step_of_the_stamps(what: str, tmp_path: 
     step = Acting(registry()["timestamp_step"], "position", 0, {"step_s": 0.05, "time_s": 60.0})
     stepped = fit(data, (step,), model.opened, start=model.level)
     search = SimpleNamespace(
-        proposals=SimpleNamespace(free_signatures=lambda _: known),
-        settings=SimpleNamespace(seed=0),
-    )
-    one = cast(SearchedLog, SimpleNamespace(data=data, search=search))
-    stands = as_built(one, stepped, ())
+        proposals=SimpleNamespace(free_signatures=lambda _: known, signatures=known),
+        episodes=(), settings=SimpleNamespace(seed=0),
+    )  # fmt: skip
+    result = SimpleNamespace(model=stepped)
+    one = cast(SearchedLog, SimpleNamespace(data=data, search=search, result=result))
+    stands = tuple(each for each in seen_in(one).stands if each.sure)
     if what == "stamps":
         assert stands == ()
         return

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.diagnosis.changed_instead import changed_instead
 from syncline_design.diagnosis.consequence import expected_rms_m
 from syncline_design.diagnosis.episodes import without_episodes
 from syncline_design.diagnosis.fitting import Data, Model
@@ -28,7 +29,13 @@ from syncline_design.diagnosis.run import SearchedLog, examined, told
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.spans import span_of
-from syncline_design.diagnosis.stretches import Stands, Stretches, left_as_one, stretches
+from syncline_design.diagnosis.stretches import (
+    Stands,
+    Stretches,
+    in_stretches,
+    left_as_one,
+    stretches,
+)
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
 from syncline_design.effects import plain_delay, registry
@@ -123,41 +130,21 @@ def _held(inputs: Measured, data: Data) -> tuple[Stands, ...]:
 
 def _seen(one: SearchedLog) -> Stretches:
     in_force().doing("looking at stretches of the log")
-    model = _built_in_undone(one)
+    lasting = _built_in_undone(one)
+    rivals = in_stretches(one.search.proposals.signatures)
+    undone = changed_instead(one.data, lasting, rivals)
+    model = undone.model
     free = one.search.proposals.free_signatures(model)
     seed = one.search.settings.seed
-    found = stretches(one.data, model, free, seed)
-    found = replace(found, stands=_as_built(one, model, found.stands))
+    found = stretches(one.data, model, free, seed, undone.hits, rivals)
     spans = [(each.from_s, each.to_s) for each in one.search.episodes or ()]
     if not spans:
         return found
-    as_usual = stretches(without_episodes(one.data), model, free, seed).stands
+    usual = without_episodes(one.data)
+    as_usual = stretches(usual, model, free, seed, rivals=rivals).stands
     loud = [s for s in as_usual if _is_one_value(s) and any(_meet(s, *span) for span in spans)]
     rest = [s for s in found.stands if not any(_meet(s, each.from_s, each.to_s) for each in loud)]
     return replace(found, stands=(*loud, *rest))
-
-
-def _as_built(one: SearchedLog, model: Model, stands: tuple[Stands, ...]) -> tuple[Stands, ...]:
-    """What stands out, and what is built in and changed once where the search has stamps that step.
-
-    A step acts in all of a log by its one moment, so that the search takes it before an arm that is
-    off from then on, though that leaves far less.  Where the delay that it makes is not among what
-    fits there as well, it is none.
-    """
-    steps = [a for a in model.acting if any(p.located for p in a.effect.parameters)]
-    if not steps:
-        return stands
-    kept = tuple(a for a in model.acting if a not in steps)
-    undone = replace(model, acting=kept, error=one.data.error(kept))
-    free = one.search.proposals.free_signatures(undone)
-    delays = {(plain_delay().name, a.sensor, a.stage) for a in steps}
-    changed = [
-        s for s in stretches(one.data, undone, free, one.search.settings.seed).stands
-        if s.sure and not s.inside and not s.noise_of and not delays & {s.label, *s.others}
-        and not registry()[s.label[0]].passing
-    ]  # fmt: skip
-    rest = [s for s in stands if not any(_meet(s, each.from_s, each.to_s) for each in changed)]
-    return (*changed, *rest)
 
 
 def _apart(stands: tuple[Stands, ...]) -> tuple[Stands, ...]:

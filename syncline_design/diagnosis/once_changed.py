@@ -5,7 +5,9 @@ and a fit of the noise takes it for slow noise.  Of every moment t that leaves e
     G(t) = b' (X' W X) b,   b = (X' W X)^-1 X' W e, from t to the end, or from the beginning to t,
 is held against what is left with a constant on either side of t: its mean square, and that of
 windows of l = 1/16 and 1/8 of the log by the same candidate, 1 + (r_l - 1) L / l at a length of L,
-where r_l over 1 is what noise of longer memory than l adds, and goes on adding at worst.
+where r_l over 1 is what noise of longer memory than l adds, and goes on adding at worst.  Of those
+that are clear the likeliest is told, each figure paid for, in the white noise that the best of them
+leaves: the slow noise that windows of a wrong candidate do not see makes it no likelier.
 Source: one change point by the likelihood ratio, Hinkley, Biometrika 57 (1970).
 """
 
@@ -20,20 +22,39 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Signature
 from syncline_design.diagnosis.stretch_fits import Hit
 from syncline_design.diagnosis.stretch_windows import BlockSums, log_chi2, squares
+from syncline_design.machine.quick_dataclass import dataclass
 
 SHORTEST, LONGEST = 0.1, 0.6  # of the log: shorter ones are windows, longer ones leave too little
 WINDOWS: Final = (16, 8)  # side by side
 SURE: Final = 1e-4  # chance of as much in white noise, paid for, from which on it is held on
 
 
+@dataclass(frozen=True, slots=True)
+class _Clear:
+    """A change that is clear: its square over the spec's noise, and what is left of one row's."""
+
+    hit: Hit
+    square: float
+    white: float
+
+    def nats(self, white: float, rows: float) -> float:
+        """Saved in noise of a variance, half of log N paid for each figure (Schwarz 1978)."""
+        figures = float(self.hit.signature.columns.shape[2])
+        return 0.5 * self.square / white - 0.5 * figures * math.log(rows)
+
+
 def once_changed(found: Sequence[tuple[Signature, BlockSums]]) -> Hit | None:
-    """The clearest change of all candidates that do not come and go; None where none is clear."""
+    """The likeliest change of all candidates that do not come and go; None where none is clear."""
     built_in = [(s, sums) for s, sums in found if not s.candidate.effect.passing]
-    hits = [hit for s, sums in built_in if (hit := _clearest(s, sums, len(built_in))) is not None]
-    return min(hits, key=lambda one: one.log_p, default=None)
+    clear = [one for s, sums in built_in if (one := _clearest(s, sums, len(built_in))) is not None]
+    if not clear:
+        return None
+    white = min(one.white for one in clear)
+    rows = max(max(float(sums.count[-1]) for _, sums in built_in), 1.0)
+    return max(clear, key=lambda one: one.nats(white, rows)).hit
 
 
-def _clearest(s: Signature, sums: BlockSums, asked: int) -> Hit | None:
+def _clearest(s: Signature, sums: BlockSums, asked: int) -> _Clear | None:
     blocks, width = len(sums.first) - 1, s.columns.shape[2]
     shortest, longest = max(round(SHORTEST * blocks), 1), math.floor(LONGEST * blocks)
     lengths = np.arange(shortest, longest + 1)
@@ -60,7 +81,8 @@ def _clearest(s: Signature, sums: BlockSums, asked: int) -> Hit | None:
         return None
     from_s = float(sums.time_s[sums.first[first[at]]])
     to_s = float(sums.time_s[sums.first[last[at]] - 1])
-    return Hit(from_s, to_s, clear, scale2, s)
+    hit = Hit(from_s, to_s, clear, scale2, s)
+    return _Clear(hit, float(own[at, 0]), float(white[at]))
 
 
 def _slow(sums: BlockSums, first: int, last: int, width: int) -> float:

@@ -135,9 +135,17 @@ class Stretches:
     reaches: tuple[ShownSize, ...] = ()
 
 
-def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -> Stretches:
-    """Every candidate of a settled model's log in every window."""
-    asked = [s for s in found if _asked(s)]
+def stretches(
+    data: Data, model: Model, found: Sequence[Signature], seed: int, known: Sequence[Hit] = (),
+    rivals: Sequence[Signature] = (),
+) -> Stretches:  # fmt: skip
+    """Every candidate of a settled model's log in every window.
+
+    known: what acts there for sure.  rivals: what it may be that stands out; what all of the log
+    shows, or does not bear out, may change or act in a part of it as well.  None: the candidates.
+    """
+    asked = in_stretches(found)
+    rivals = rivals or asked
     if not asked or len(data.view) < 4 * LEAST_ROWS:
         return Stretches()
     rng = generator([seed, STREAM])
@@ -151,8 +159,9 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -
         if s.candidate.effect.breaks in ASKED:
             reaches += _reaches(data, s, sums, windows)
     hits += _changed(data, whitened, every)
-    stands = (_beside_noise(data, whitened, asked, *one)
-              for one in _stands(data, model, asked, hits))  # fmt: skip
+    ranked = [*known, *sorted(hits, key=lambda one: one.log_p)]
+    stands = (_beside_noise(data, whitened, rivals, *one)
+              for one in _stands(data, model, rivals, ranked))  # fmt: skip
     return Stretches(tuple(stands), tuple(reaches))
 
 
@@ -186,16 +195,17 @@ def _beside_noise(
 def left_as_one(data: Data, model: Model, known: Sequence[Signature]) -> OneCourse | None:
     """Whether what a settled model leaves is one course that begins and ends, of any effect that
     may act in a part of a log, those that the model holds among them."""
-    asked = [s for s in known if _asked(s)]
+    asked = in_stretches(known)
     if not asked or len(data.view) < 4 * LEAST_ROWS:
         return None
     whitened = _whitened(data, np.zeros((0, len(data.view), 3)), model)
     return one_course([(s.candidate.label, _summed(data, whitened, s)) for s in asked])
 
 
-def _asked(s: Signature) -> bool:
-    effect = s.candidate.effect
-    return s.plain and effect.asked_in_stretches and cuttable(effect)
+def in_stretches(found: Sequence[Signature]) -> list[Signature]:
+    """Those that are asked in stretches."""
+    effects = [(s, s.candidate.effect) for s in found if s.plain]
+    return [s for s, effect in effects if effect.asked_in_stretches and cuttable(effect)]
 
 
 def _whitened(data: Data, drawn: Array, model: Model) -> tuple[Array, Array]:
@@ -245,8 +255,8 @@ def _hits(s: Signature, sums: BlockSums, windows: Sequence[Windows]) -> Iterator
 def _stands(
     data: Data, model: Model, asked: Sequence[Signature], hits: Sequence[Hit]
 ) -> Iterator[tuple[Stands, float]]:
-    """The clearest window, named, with its length's noise; then that elsewhere, and so on."""
-    left = sorted(hits, key=lambda one: one.log_p)
+    """The first window, named, with its length's noise; then the next elsewhere, and so on."""
+    left = list(hits)
     while left:
         best = left[0]
         for _ in range(ENDS_ROUNDS):
