@@ -18,7 +18,14 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
-from syncline_design.planning.legs import Leg, LegTooLongError, course, ramps, speed_words
+from syncline_design.planning.legs import (
+    Leg,
+    LegTooLongError,
+    course,
+    ramps,
+    speed_words,
+    transition,
+)
 from syncline_design.planning.path import STEP_S, rounded
 from syncline_design.planning.vehicle import ALONG, Vehicle
 
@@ -100,8 +107,9 @@ def swing(
     if shape.bend and not arc_deg:
         return None
     radius = length / math.radians(arc_deg) if arc_deg else math.inf
-    words = f"{_where(arc_deg, radius)}: {_words(run, rounded(vehicle, ahead))}"
     begins_mps = None if run.joins else run.begins_mps
+    before = transition(vehicle, 0.0, begins_mps).ahead  # without it rounding takes off its speed
+    words = f"{_where(arc_deg, radius)}: {_words(run, rounded(vehicle, np.append(before, ahead)))}"
     return Leg(NAME, stage, words, course(ahead, turn=ahead / radius), begins_mps)
 
 
