@@ -37,7 +37,7 @@ def test_two_that_do_better_than_one_are_ranked_by_least_squares() -> None:
     level = object()
     (found,) = in_the_place([(level, scores)], free, (*LABELS[0], 0))  # type: ignore[list-item]
     assert {s.candidate.label[:2] for s in found.pair} == {LABELS[1], LABELS[2]}
-    assert -found.log_p == pytest.approx(0.5 * (left([0]) - left([1, 2])), rel=1e-6)
+    assert found.more == pytest.approx(0.5 * (left([0]) - left([1, 2])), rel=1e-6)
     small = Gram(scores.score * np.array([9.0, 1.0, 1.0]), scores.normal, scores.groups, 0.0)
     assert not in_the_place([(level, small)], free, (*LABELS[0], 0))  # type: ignore[list-item]
 

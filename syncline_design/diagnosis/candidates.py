@@ -61,6 +61,11 @@ class Signature:
         """Whether it is its candidate's one slope at zero."""
         return not self.at and not self.start
 
+    @property
+    def asked_jointly(self) -> bool:
+        """Whether it is looked at together with others: what a build can be wrong by."""
+        return self.plain and self.candidate.effect.asked_jointly
+
 
 def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...]:
     """Every effect that this kind of log and this system can show."""

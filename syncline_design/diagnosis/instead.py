@@ -83,7 +83,7 @@ class InQuestion:
 
 def in_place(data: Data, model: Model, found: Sequence[Signature]) -> tuple[InItsPlace, ...]:
     """Of every departure that a model holds, others that would do together in its place."""
-    signed = [s for s in found if s.plain and s.candidate.effect.asked_jointly]
+    signed = [s for s in found if s.asked_jointly]
     labels = tuple(s.candidate.label for s in signed)
     own = [one for one in model.acting if one.label in labels]
     if len(signed) < 3 or not own:

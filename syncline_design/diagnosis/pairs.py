@@ -32,12 +32,21 @@ SignaturePair = tuple[Signature, Signature]
 
 @dataclass(frozen=True, slots=True)
 class Promising:
-    """Two signatures, the noise level under which they save most, and log p of that by chance; of
-    two in the place of one, less what they save more than that [nat] in its stead."""
+    """Two signatures, the noise level under which they save most, and log p of that by chance."""
 
     pair: SignaturePair
     level: NoiseLevel
     log_p: float
+
+
+@dataclass(frozen=True, slots=True)
+class InOnesPlace:
+    """Two signatures in the place of one, the noise level under which they do best against it, and
+    what they save more there [nat]."""
+
+    pair: SignaturePair
+    level: NoiseLevel
+    more: float
 
 
 def promising(
@@ -62,7 +71,7 @@ def promising(
 
 def in_the_place(
     scores: Sequence[tuple[NoiseLevel, Gram]], free: Sequence[Signature], label: Label
-) -> list[Promising]:
+) -> list[InOnesPlace]:
     """Pairs that save about as much as the one effect of a label, or more; the best first.
 
     scores: of all in `free`, that effect among them, where it is taken out of the model.  A wave or
@@ -82,7 +91,7 @@ def in_the_place(
             if found is not None and found > least and found - own > best.get(one, (-math.inf,))[0]:
                 best[one] = found - own, level
     ranked = sorted(best.items(), key=lambda entry: (-entry[1][0], entry[0]))
-    return [Promising((free[one[0]], free[one[1]]), level, -more) for one, (more, level) in ranked]
+    return [InOnesPlace((free[one[0]], free[one[1]]), level, more) for one, (more, level) in ranked]
 
 
 def clearly_two(data: Data, two: Model, one: Model, free: Sequence[Signature]) -> bool:
@@ -93,14 +102,9 @@ def clearly_two(data: Data, two: Model, one: Model, free: Sequence[Signature]) -
     return one.nll - two.nll > CLEAR_NATS + paid
 
 
-def asked_in_pairs(found: Signature) -> bool:
-    """Whether it is looked at beside another one: what a build can be wrong by."""
-    return found.plain and found.candidate.effect.asked_jointly
-
-
 def _pairs(free: Sequence[Signature]) -> list[tuple[int, int]]:
     """Of what is asked jointly, whatever two."""
-    return list(combinations([k for k, s in enumerate(free) if asked_in_pairs(s)], 2))
+    return list(combinations([k for k, s in enumerate(free) if s.asked_jointly], 2))
 
 
 def _freedom(free: Sequence[Signature], one: tuple[int, int]) -> int:
@@ -127,7 +131,7 @@ def standing(states: States, model: Model, found: Sequence[Promising], limit: fl
     return [one for one, j in zip(found, judged, strict=True) if j.log_p < limit]
 
 
-def with_pair(data: Data, model: Model, found: Promising) -> Model:
+def with_pair(data: Data, model: Model, found: Promising | InOnesPlace) -> Model:
     """The model with both, fitted from zero by re-simulation."""
     started = tuple(
         s.candidate.acting({**zero_values(s.candidate.effect, s.at), **s.start}) for s in found.pair

@@ -195,10 +195,12 @@ class Proposals:
     def rungs(self, model: Model, scores: Gram) -> list[Rung]:
         """Scores of what the model does not hold under every noise of the ladder."""
         free = self.free_signatures(model)
-        return [
-            (level, scores if level is model.level else gram(self.data, model, free, level))
-            for level in ladder(self.data, model)
-        ]
+        own, *others = ladder(self.data, model)
+        return [(own, scores), *((level, gram(self.data, model, free, level)) for level in others)]
+
+    def rungs_of(self, model: Model, asked: Sequence[Signature]) -> list[Rung]:
+        """The same of some signatures alone."""
+        return [(level, gram(self.data, model, asked, level)) for level in ladder(self.data, model)]
 
     def screened(self, model: Model, rungs: Sequence[Rung]) -> list[tuple[Signature, NoiseLevel]]:
         """Signatures that gain most under any noise of the ladder, one per candidate."""

@@ -22,10 +22,9 @@ from syncline_design.diagnosis.episodes import Episode, episode_effect, episodes
 from syncline_design.diagnosis.fitting import Data, Model, finely, fit
 from syncline_design.diagnosis.identity import without
 from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
-from syncline_design.diagnosis.pairs import asked_in_pairs, clearly_two, in_the_place, with_pair
+from syncline_design.diagnosis.pairs import clearly_two, in_the_place, with_pair
 from syncline_design.diagnosis.parts import cut_down
-from syncline_design.diagnosis.proposals import Label, Proposals, ladder
-from syncline_design.diagnosis.scores import gram
+from syncline_design.diagnosis.proposals import Label, Proposals
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.settling import Settled, borne_out, settle
 from syncline_design.diagnosis.slow_states import States, fitted_of, slow_states
@@ -205,10 +204,9 @@ class Search:
             rest = without(model, one.label)
             rest = replace(rest, error=self.data.error(rest.acting))
             free = [s for s in self.proposals.free_signatures(rest)
-                    if asked_in_pairs(s) or s.candidate.label == one.label]  # fmt: skip
-            scored = [(level, gram(self.data, rest, free, level))
-                      for level in ladder(self.data, rest)]  # fmt: skip
-            for pair in in_the_place(scored, free, one.label)[:TRIED_PAIRS]:
+                    if s.asked_jointly or s.candidate.label == one.label]  # fmt: skip
+            rungs = self.proposals.rungs_of(rest, free)
+            for pair in in_the_place(rungs, free, one.label)[:TRIED_PAIRS]:
                 two = with_pair(self.data, rest, pair)
                 if (
                     clearly_two(self.data, two, self.at_least(model, two), free)

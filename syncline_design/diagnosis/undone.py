@@ -50,7 +50,7 @@ def left_open(data: Data, model: Model, found: Sequence[Signature]) -> tuple[Lef
     found: signatures of all effects, those that the model holds as well: a delay that was found may
     be a part of one that all sensors share.
     """
-    asked = [s for s in found if s.plain and s.candidate.effect.asked_jointly]
+    asked = [s for s in found if s.asked_jointly]
     if len(asked) < 2:
         return ()
     return tuple(_left_open(data, model, asked))
