@@ -11,7 +11,7 @@ import pytest
 from syncline_design.report import render_console
 from syncline_design.report.console_table import fitted, folded
 from syncline_design.report.on_verdict import on_verdict
-from syncline_design.report.table import table
+from syncline_design.report.table import Cell, table
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings
 from tests.checked import check_file
@@ -152,3 +152,9 @@ def test_colours_are_where_they_can_be_shown_or_are_asked_for(
     monkeypatch.setattr("sys.stdout", stream)
     text = render_console.console(on_verdict(verdict_of("infeasible_example")))
     assert ("\x1b[31m" in text, "\x1b[" in text) == (coloured, coloured)
+
+
+def test_a_symbol_stays_with_its_first_word() -> None:
+    rows = [[Cell("10", 10, mark="+"), "a file of a name that needs all the room there is"]]
+    lines = [line.rstrip() for line in fitted(table("", ("Run", "File"), rows), 30)]
+    assert any(line.startswith("+ 10") for line in lines), lines

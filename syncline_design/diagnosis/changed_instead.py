@@ -19,14 +19,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from syncline_design.diagnosis.candidates import Signature, zero_values
+from syncline_design.diagnosis.candidates import Signature
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.fitting import Data, Model, Stepped, stepped
 from syncline_design.diagnosis.identity import Label
 from syncline_design.diagnosis.noise import precision
 from syncline_design.diagnosis.once_changed import SURE
-from syncline_design.diagnosis.spans import StampSpan, cut_to
-from syncline_design.diagnosis.stretch_fits import AS_GOOD_NATS, Hit, as_loud
+from syncline_design.diagnosis.stretch_fits import AS_GOOD_NATS, Hit, as_loud, in_stretch
 from syncline_design.diagnosis.stretch_windows import log_chi2
 from syncline_design.effects import plain_delay
 from syncline_design.effects.acting import Acting
@@ -88,7 +87,9 @@ def _rivals(
     own = _at_best(data, model.acting, white)
     for labels, stretch in places:
         less = tuple(a for a in model.acting if a.label not in labels)
-        tried = [(s, _at_best(data, (*less, _cut(data, s, stretch)), white)) for s in built_in]
+        tried = [
+            (s, _at_best(data, (*less, in_stretch(data, s, stretch)), white)) for s in built_in
+        ]
         tried = [(s, fit) for s, fit in tried if _is_in_reach(s, fit.acting[-1])]
         if tried:
             s, fit = min(tried, key=lambda pair: pair[1].squares)
@@ -115,13 +116,6 @@ def _rival(
 
 def _at_best(data: Data, acting: tuple[Acting, ...], white: Precision) -> Stepped:
     return stepped(data, acting, white, data.error(acting), steps=6)
-
-
-def _cut(data: Data, s: Signature, stretch: tuple[float, float]) -> Acting:
-    """What is built in, in a stretch alone."""
-    one = s.candidate
-    cut = cut_to(StampSpan(one.effect, *stretch), s, data.view.log.time_s)
-    return Acting(cut.candidate.effect, one.sensor, one.stage, zero_values(one.effect))
 
 
 def _is_in_reach(s: Signature, one: Acting) -> bool:

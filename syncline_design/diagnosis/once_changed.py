@@ -63,10 +63,9 @@ def _clearest(s: Signature, sums: BlockSums, asked: int) -> _Clear | None:
     first = np.concatenate([np.zeros(len(lengths), int), blocks - lengths])
     last = np.concatenate([lengths, np.full(len(lengths), blocks)])
     normal, score = sums.normal, sums.score[:, :1]
-    own, seen = squares(normal[last] - normal[first], score[last] - score[first], width)
-    rest, _ = squares(
-        normal[-1] - (normal[last] - normal[first]), score[-1] - (score[last] - score[first]), width
-    )
+    inside, told = normal[last] - normal[first], score[last] - score[first]
+    own, seen = squares(inside, told, width)
+    rest, _ = squares(normal[-1] - inside, score[-1] - told, width)
     freedom = max(float(sums.count[-1]) - 2.0 * width, 1.0)
     left = np.maximum(sums.square[-1] - own[:, 0] - rest[:, 0], 0.0) / freedom
     white = np.maximum(left, 1.0)

@@ -117,9 +117,7 @@ def _fitted_in(
 ) -> WindowFit | None:
     """One candidate in a window beside the model's effects, in the spec's white noise."""
     view = data.view
-    cut = cut_to(StampSpan(s.candidate.effect, hit.from_s, hit.to_s), s, view.log.time_s)
-    own = Acting(cut.candidate.effect, s.candidate.sensor, s.candidate.stage,
-                 zero_values(s.candidate.effect))  # fmt: skip
+    own = in_stretch(data, s, (hit.from_s, hit.to_s))
     start = data.error(model.acting)
     acting, after, covariance = adjusted(data, (*model.acting, own), white, start, steps=6)
     slopes = s.candidate.effect.slopes()
@@ -133,6 +131,13 @@ def _fitted_in(
     spreads = np.sqrt(scale2 * np.maximum(np.diag(covariance)[-len(slopes) :], 0.0))
     nats = saved / scale2 - 0.5 * len(slopes) * math.log(rows)
     return WindowFit(s, nats, saved / scale2, values, tuple(map(float, spreads)), data)
+
+
+def in_stretch(data: Data, s: Signature, stretch: tuple[float, float]) -> Acting:
+    """A candidate that acts from one stamp to another [s] alone, at zero."""
+    one = s.candidate
+    cut = cut_to(StampSpan(one.effect, *stretch), s, data.view.log.time_s)
+    return Acting(cut.candidate.effect, one.sensor, one.stage, zero_values(one.effect))
 
 
 def made(model: Model, fit: WindowFit) -> Array:

@@ -177,16 +177,14 @@ def noncentrality_of(information: Array, pair: PairGoal) -> float:
     )
 
 
-def told_from(information: Array, pair: PairGoal) -> Array | None:
-    """Sizes of the effect named first, each parameter alone, from which it is told apart, where its
-    size is not known; infinite for what is never told.
+def told_from(information: Array, pair: PairGoal) -> Array:
+    """Sizes [SI] of the effect named first, each parameter alone, from which it is told apart (p,);
+    infinite for what is never told.
 
     To first order the noncentrality of one of size v is v^2 (G_AA - G_AB G_BB^-1 G_BA)_kk, so that
     two effects whose correlation makes them one class are told apart all the same where one is
     large.
     """
-    if pair.known:
-        return None
     alone = np.diag(schur(information, pair.first, pair.second))
     seen = alone > LEAST_SEEN * np.diag(information)[list(pair.first)]
     return np.where(seen, np.sqrt(NONCENTRALITY / np.where(seen, alone, 1.0)), np.inf)

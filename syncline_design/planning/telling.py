@@ -94,13 +94,27 @@ class Telling:
 
     def whole(self, found: WholeDrive, least_s: float | None, most_s: float) -> PlanRun:
         """The result and the path of a drive; least_s: the least time that reaches all."""
+        path, target, leg = self._path(found)
+        drives = found.stretches[-1].leg.stage
+        vehicle = self.setup.world.vehicles[drives]
+        others = {
+            one.name: found.driven.states[k].at(path.time_s)
+            for k, one in enumerate(self.setup.system.stages)
+            if k != drives
+        }
+        return PlanRun(
+            self._result(found, least_s, most_s), path, target, leg, found.driven, vehicle.motion,
+            others, approach(vehicle, path),
+        )  # fmt: skip
+
+    def _result(self, found: WholeDrive, least_s: float | None, most_s: float) -> Plan:
+        """What a drive tells; least_s: the least time that reaches all, most_s: what is given."""
         duration = duration_s(found)
         reached = self.setup.reached(found) and duration <= most_s
-        path, target, leg = self._path(found)
         legs = self._legs(found)
         spec = self.setup.case.spec
         origin = spec.log.origin if spec.log else None
-        result = Plan(
+        return Plan(
             reached=reached,
             spec=SpecRead(spec.name, str(self.setup.case.path)),
             minutes=self.setup.request.minutes,
@@ -136,27 +150,18 @@ class Telling:
             dear=tuple(dear_legs(self.setup, found)) or None if reached else None,
             calm=in_calm_water(self.setup, found) if reached else None,
             untold=self._untold(found.after[-1]) or None,
-            cautions=(
-                *self._cautions(),
-                *beyond_areas(self.setup, found.driven),
-                *(() if reached or self.setup.inseparable else tight_areas(self.setup)),
-                *_out_of_sight(found.driven),
-            )
-            or None,
-        )
-        vehicle = self.setup.world.vehicles[found.stretches[-1].leg.stage]
-        others = {
-            one.name: found.driven.states[k].at(path.time_s)
-            for k, one in enumerate(self.setup.system.stages)
-            if k != found.stretches[-1].leg.stage
-        }
-        return PlanRun(
-            result, path, target, leg, found.driven, vehicle.motion, others, approach(vehicle, path)
+            cautions=tuple(self._cautions(found, reached=reached)) or None,
         )
 
-    def _cautions(self) -> tuple[str, ...]:
-        found = self.setup.request.diagnosis
-        return () if found is None else cautions_of(self.setup.case, self.setup.system, found)
+    def _cautions(self, found: WholeDrive, *, reached: bool) -> Iterator[str]:
+        """What may make the plan another system's, or its drive one that cannot be driven."""
+        setup, diagnosis = self.setup, self.setup.request.diagnosis
+        if diagnosis is not None:
+            yield from cautions_of(setup.case, setup.system, diagnosis)
+        yield from beyond_areas(setup, found.driven)
+        if not (reached or setup.inseparable):
+            yield from tight_areas(setup)
+        yield from _out_of_sight(found.driven)
 
     def _tolerance(self) -> dict[str, float]:
         pairs = zip(self.setup.goal.wanted, self.setup.goal.tolerance, strict=True)
@@ -186,12 +191,10 @@ class Telling:
         own = [self.setup.world.every[k].parameter for k in pair.first]
         names = [one.name for one in own]
         apart = pair_ratio(information, pair) <= 1.0
-        larger = None if apart else told_from(information, pair)
-        plausible = {
-            one.name: float(size)
-            for one, size in zip(own, () if larger is None else larger, strict=larger is not None)
-            if size <= one.high
-        }
+        larger = {}
+        if not (apart or pair.known):
+            sizes = zip(own, told_from(information, pair), strict=True)
+            larger = {one.name: float(size) for one, size in sizes if size <= one.high}
         return Separated(
             *pair.names,
             canonical_correlation(information, pair.first, pair.second),
@@ -199,7 +202,7 @@ class Telling:
             NONCENTRALITY,
             apart,
             dict(zip(names, map(float, pair.sizes), strict=True)),
-            plausible or None,
+            larger or None,
         )
 
     def _confused(self, information: Array) -> tuple[str, ...]:

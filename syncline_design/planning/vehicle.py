@@ -127,7 +127,7 @@ class Vehicle:
         return max(speed_mps**2 - self.slowest_mps**2, 0.0) / (2.0 * self.acceleration_mps2)
 
     def run_m(self, speed_mps: float) -> float:
-        """Way straight on before a drive that begins at a speed, and after one that ends at it.
+        """Way [m] straight on before a drive that begins at a speed, and after one that ends at it.
 
         What cannot stop comes from anywhere at some speed: it needs room to get onto the line, and
         turns off it before the last place that it is sent to; two radii of its turn.
