@@ -12,12 +12,14 @@ from typer.testing import CliRunner
 from diagnosis_samples import diagnosis
 from syncline_design.cli.app import app
 from syncline_design.comparison.meaning import DiagnosisAndDesign
-from syncline_design.diagnosis.result import SlowNoise
+from syncline_design.diagnosis.result import Rival, SlowNoise
 from syncline_design.diagnosis.same_system import description
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.records import read_as
-from syncline_design.planning.from_diagnosis import asked_of, cautions_of
-from syncline_design.planning.wanted import PlanError
+from syncline_design.planning.from_diagnosis import asked_of, cautions_of, foreign_words
+from syncline_design.planning.run import plan
+from syncline_design.planning.setup import PlanRequest, Setup
+from syncline_design.planning.wanted import PlanError, PlanWanted, separate_of
 from syncline_design.spec.load import load
 
 STAMPED = "timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}"
@@ -134,3 +136,37 @@ def test_noise_of_a_sensor_that_the_spec_has_not_is_refused(
     other = replace(found, noise=replace(found.noise, **noise))  # type: ignore[arg-type]
     with pytest.raises(PlanError, match="sensors of this spec, which are car/attitude, car/posit"):
         asked_of(pinned_system(load(spec(tmp_path))), other)
+
+
+def test_what_the_diagnosis_names_and_the_system_cannot_have_is_left_out_and_said(
+    tmp_path: Path,
+) -> None:
+    """A car's lidar may sag, though a car that keeps level hardly shows it; it has no sound speed.
+    Both were refused, and the whole diagnosis with them."""
+    case = load(spec(tmp_path, CAR.replace("baseline: 0.5 m", "baseline: 0.5 m, motion: ground")))
+    rivals = tuple(Rival(name, "ranging", "car", 0.9, 0.4) for name in ("flexure", "sound_speed"))
+    found = diagnosis(system=description(pinned_system(case)))
+    asked = replace(found, findings=(replace(found.findings[0], aliases=rivals),))
+    setup = Setup.begun(case, PlanRequest(diagnosis=asked))
+    told = [one.candidate.effect.name for one in setup.world.every]
+    assert "flexure" in told
+    assert "sound_speed" not in told
+    assert [pair.names[1] for pair in setup.goal.pairs] == ["flexure(ranging)"]
+    assert list(foreign_words(setup.foreign)) == [
+        "The diagnosis names what does not apply to this system, left out here: "
+        "sound_speed(ranging)."
+    ]
+    assert Setup.begun(case, PlanRequest()).foreign == ()
+    typed = PlanRequest(PlanWanted((), separate_of("latency(position)", "sound_speed(ranging)")))
+    with pytest.raises(PlanError, match=r"sound_speed\(ranging\) does not apply to stage 'car'"):
+        Setup.begun(case, typed)
+
+
+def test_the_words_stand_in_the_plan(tmp_path: Path) -> None:
+    case = load(spec(tmp_path))
+    found = diagnosis(system=description(pinned_system(case)))
+    rivals = (*found.findings[0].aliases, Rival("sound_speed", "ranging", "car", 0.9, 0.4))
+    asked = replace(found, findings=(replace(found.findings[0], aliases=rivals),))
+    result = plan(case, PlanRequest(diagnosis=asked, line_plans=False)).result
+    assert result.reached
+    assert any("left out here: sound_speed(ranging)" in one for one in result.cautions or ())

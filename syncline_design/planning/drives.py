@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
@@ -27,6 +27,7 @@ from syncline_design.planning.information import (
     drift_columns,
     expected_noise,
     fisher,
+    hardly_moved,
     late,
     unknowns,
     with_shift,
@@ -152,8 +153,18 @@ class World:
         """All unknowns, as a drive of one turning leg shows them."""
         if self.same_unknowns is not None:
             return self.same_unknowns
+        return unknowns(self._turning)
+
+    def with_asked(self, labels: Collection[tuple[str, str, int]]) -> World:
+        """The same with what is asked for by name, though that drive hardly shows it."""
+        more = tuple(u for u in hardly_moved(self._turning) if u.candidate.label in labels)
+        return replace(self, same_unknowns=(*self.every, *more))
+
+    @cached_property
+    def _turning(self) -> Scene:
+        """A drive of one turning leg."""
         turning = next((g for g in self.legs if g.name == "figure eight"), self.legs[0])
-        return unknowns(self.view(self.driven(self.courses_of(turning.stage, turning.course))))
+        return self.view(self.driven(self.courses_of(turning.stage, turning.course)))
 
     def looked_at(self, legs: Sequence[Leg]) -> tuple[LegTold, ...]:
         """What each of some legs alone would tell, at four headings; all looked at as one log."""

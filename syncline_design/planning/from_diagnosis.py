@@ -62,6 +62,13 @@ def cautions_of(case: Case, system: System, found: Diagnosis) -> tuple[str, ...]
     )
 
 
+def foreign_words(left_out: Sequence[NamedEffect]) -> Iterator[str]:
+    """That a diagnosis names what this system cannot have, and what becomes of it."""
+    if left_out:
+        names = ", ".join(one.text for one in left_out)
+        yield f"The diagnosis names what does not apply to this system, left out here: {names}."
+
+
 def _demand_same(system: System, found: Diagnosis) -> None:
     """Refuse a diagnosis of a system that measures otherwise: its classes and its noise, which
     counts in the spec's sigmas, say nothing of this one."""

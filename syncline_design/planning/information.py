@@ -9,7 +9,7 @@ Source: Kay, Estimation Theory (1993), ch. 3 and 11.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -48,13 +48,20 @@ class Unknown:
 
 
 def unknowns(view: Scene) -> tuple[Unknown, ...]:
-    """Every parameter that moves the mean error and that this system can have."""
-    return tuple(
-        Unknown(c, p)
-        for c in effects_of.candidates(view)
-        if c.effect.sensitivity is not None
-        for p in c.effect.slopes()
-    )
+    """Every parameter that moves the mean error and that this drive can show."""
+    return tuple(_parameters(effects_of.candidates(view)))
+
+
+def hardly_moved(view: Scene) -> tuple[Unknown, ...]:
+    """Those that this system can have besides, though what they follow hardly varies here: the
+    bend of a mount on a vehicle that keeps level."""
+    return tuple(_parameters(effects_of.hidden_by_noise(view)))
+
+
+def _parameters(found: Sequence[effects_of.Candidate]) -> Iterator[Unknown]:
+    for one in found:
+        if one.effect.sensitivity is not None:
+            yield from (Unknown(one, p) for p in one.effect.slopes())
 
 
 def late(time_s: Array) -> Array:

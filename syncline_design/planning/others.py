@@ -50,11 +50,12 @@ class Others:
 
 
 def others_of(
-    every: Sequence[Unknown], goal: Goal, library: Array, prior: Array
+    every: Sequence[Unknown], goal: Goal, library: Array, prior: Array, held: Sequence[int] = ()
 ) -> tuple[Others, Others]:
     """The other effects that some drive tells from what is wanted, and those that none tells from
-    some of it, or hardly: these have to be known otherwise.  library: all legs together."""
-    index = _index(every, {every[k].candidate.label for k in goal.wanted})
+    some of it, or hardly: these have to be known otherwise.  library: all legs together.  held:
+    places of what is known as a reference, which is no other effect."""
+    index = _index(every, {every[k].candidate.label for k in (*goal.wanted, *held)})
     found = Others(index, np.zeros((0, 0)))
     if not len(index):
         none = Others(index, np.zeros((0, len(goal.wanted))))

@@ -142,6 +142,19 @@ class Untold(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class HeldEffect(Record):
+    """An effect that is asked and held as known, since together with others that are asked it makes
+    no error whatever is driven: those are told beside it.
+
+    parameters: which of its own.  beside: the others; none where no drive shows it at all.
+    """
+
+    effect: str
+    parameters: tuple[str, ...]
+    beside: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class CalmWater(Record):
     """A drive in calm water: whether it is enough there, and what it lacks where it is not."""
 
@@ -176,7 +189,8 @@ class Plan(Record):
     whether pairs are judged at a size that is known, beyond first order.  cautions: where what the
     plan was given may not be of this system.  alike: of the inseparable ones those that make the
     same error on every leg that this platform can drive.  untold: what has to be known otherwise,
-    since no drive tells it from what is asked.
+    since no drive tells it from what is asked.  held: what is asked and no drive tells from what is
+    asked besides, taken as known.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -209,6 +223,7 @@ class Plan(Record):
     dear: tuple[DearLeg, ...] | None = optional()
     calm: CalmWater | None = optional()
     untold: tuple[Untold, ...] | None = optional()
+    held: tuple[HeldEffect, ...] | None = optional()
 
     @property
     def exit_code(self) -> int:

@@ -113,10 +113,18 @@ class PlanJudge:
         return int(self.others.index[row, 0]), float(widened), float(widened / shares[row])
 
     def confusing(self, information: Array) -> list[int]:
-        """First places of the effects that widen something more than they may."""
+        """First places of the effects that widen something more than they may.
+
+        What the drive leaves that uncertain by itself is no doing of theirs: of that only who at
+        least doubles it.
+        """
         if not len(self.others.index):
             return []
-        beyond = np.any(self._shares(information) > 1.0, axis=1)
+        index, vague = list(self.goal.wanted), VAGUE * self.prior
+        covariance, _ = covariance_of(information[np.ix_(index, index)], vague[index])
+        widened = self.others.widened(information, index, vague)
+        own = widened > TWICE * np.sqrt(np.diag(covariance))
+        beyond = np.any((self._shares(information) > 1.0) & own, axis=1)
         return [int(k) for k in self.others.index[beyond, 0]]
 
     def standing(self, information: Array) -> Standing:

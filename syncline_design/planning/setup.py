@@ -34,14 +34,17 @@ from syncline_design.planning.others import Others, others_of
 from syncline_design.planning.path import joined
 from syncline_design.planning.placing import LegTold
 from syncline_design.planning.search import PlanJudge, noncentrality_of, pair_ratio
+from syncline_design.planning.singular import HeldPlaces, told_beside
 from syncline_design.planning.vehicle import vehicles
 from syncline_design.planning.wanted import (
     Goal,
+    NamedEffect,
     PairGoal,
     PlanError,
     PlanWanted,
     goal_of,
     keys_of,
+    label_of,
     usual,
 )
 from syncline_design.spec.case import Case
@@ -76,7 +79,9 @@ class PlanRequest:
 class Setup:
     """What a plan starts from: the world, what is asked of it, and every leg looked at.
 
-    untold: other effects that no drive tells from some of what is asked.
+    untold: other effects that no drive tells from some of what is asked.  foreign: effects that the
+    diagnosis names and that this system cannot have, left out of what is asked.  held: what is
+    asked and held as known, since no drive tells it from the rest.
     """
 
     case: Case
@@ -88,6 +93,8 @@ class Setup:
     inseparable: tuple[str, ...]
     alike: tuple[str, ...]
     untold: Others
+    foreign: tuple[NamedEffect, ...]
+    held: tuple[HeldPlaces, ...]
 
     @classmethod
     def begun(cls, case: Case, request: PlanRequest) -> Setup:
@@ -97,7 +104,7 @@ class Setup:
         system = pinned_system(case)
         world = _world(case, system, request)
         _demand_legs(world)
-        asked = _asked(system, world.every, request)
+        world, asked, foreign = _asked(world, request)
         in_force().doing("looking at the legs")
         view = _sampled(world)
         goal = goal_of(system, world.every, asked, *_sizes(world, view))
@@ -109,9 +116,10 @@ class Setup:
         share = BEST_LEGS * SECONDS * request.minutes / (4.0 * sum(t.leg.duration_s for t in told))
         alike = tuple(_words(p) for p in goal.pairs if _is_one(library, p))
         goal, apart = _separable(goal, library, share)
-        others, untold = others_of(world.every, goal, library, prior)
+        goal, held = told_beside(world.every, goal, library)
+        others, untold = others_of(world.every, goal, library, prior, [one.held for one in held])
         judge = PlanJudge(goal, prior, others)
-        return cls(case, request, world, goal, judge, told, apart, alike, untold)
+        return cls(case, request, world, goal, judge, told, apart, alike, untold, foreign, held)
 
     @property
     def in_calm_water(self) -> Setup:
@@ -170,20 +178,25 @@ def _rate_hz(case: Case, system: System) -> float:
     return DEFAULT_HZ if rate is None else float(rate)
 
 
-def _asked(system: System, every: Sequence[Unknown], request: PlanRequest) -> PlanWanted:
-    """What the options and the diagnosis ask for together; nothing: what usually matters."""
-    reach, pairs = list(request.asked.reach), list(request.asked.pairs)
-    if request.diagnosis is not None:
-        found = asked_of(system, request.diagnosis)
-        given = {one.text for one, _ in reach}
-        reach += [entry for entry in found.reach if entry[0].text not in given]
-        pairs += found.pairs
-    asked = PlanWanted(tuple(reach), tuple(pairs))
-    if not asked.reach and not asked.pairs:
-        asked = usual(system, every)
-    if not asked.reach and not asked.pairs:
+def _asked(world: World, request: PlanRequest) -> tuple[World, PlanWanted, tuple[NamedEffect, ...]]:
+    """What the options and the diagnosis ask for together, in a world that knows it; nothing: what
+    usually matters.  With it what the diagnosis names and the system cannot have, left out."""
+    system, stated = world.system, request.asked
+    found = PlanWanted() if request.diagnosis is None else asked_of(system, request.diagnosis)
+    named = {one: label_of(system, one, "--diagnosis") for one in found.named}
+    labels = {*named.values(), *(label_of(system, one, "the plan") for one in stated.named)}
+    world = world.with_asked(labels)
+    known = {one.candidate.label for one in world.every}
+    foreign = tuple(one for one, label in named.items() if label not in known)
+    found = found.without(foreign)
+    given = {one.text for one, _ in stated.reach}
+    reach = (*stated.reach, *(one for one in found.reach if one[0].text not in given))
+    asked = PlanWanted(reach, (*stated.pairs, *found.pairs))
+    if not asked.named:
+        asked = usual(system, world.every)
+    if not asked.named:
         raise PlanError("nothing to plan for: no effect applies to this system")
-    return asked
+    return world, asked, foreign
 
 
 def _legs_of(world: World, goal: Goal) -> tuple[Leg, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 import numpy as np
@@ -21,13 +21,13 @@ from syncline_design.planning.areas import beyond_areas, tight_areas
 from syncline_design.planning.drives import DrivenLeg, WholeDrive, World
 from syncline_design.planning.fixed_targets import FixedTargets
 from syncline_design.planning.flown_drives import flown_drives
-from syncline_design.planning.from_diagnosis import cautions_of
+from syncline_design.planning.from_diagnosis import cautions_of, foreign_words
 from syncline_design.planning.information import (
     canonical_correlation,
     sigmas,
 )
 from syncline_design.planning.lacking import dear_legs, in_calm_water
-from syncline_design.planning.others import taken_by
+from syncline_design.planning.left_open import confused, held, unseen, untold
 from syncline_design.planning.path import PathStates, unasked
 from syncline_design.planning.planned_log import Drive
 from syncline_design.planning.result import (
@@ -39,7 +39,6 @@ from syncline_design.planning.result import (
     PlanProvenance,
     Separated,
     StandardPlan,
-    Untold,
 )
 from syncline_design.planning.search import (
     NONCENTRALITY,
@@ -49,12 +48,8 @@ from syncline_design.planning.search import (
 )
 from syncline_design.planning.setup import SECONDS, Setup
 from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
-from syncline_design.planning.wanted import (
-    PairGoal,
-    text_of,
-)
+from syncline_design.planning.wanted import PairGoal
 
-UNSEEN: Final = 0.7  # of what is plausible: a parameter left that uncertain is not shown
 MOST_BLIND: Final = 0.15  # of a drive without a target in sight, before that is said
 ROW_S: Final = 0.1  # between rows of the path that is written
 MOST_PATH_ROWS: Final = 200_000
@@ -126,8 +121,8 @@ class Telling:
             pairs=tuple(self._separated(found.after[-1], p) for p in self.setup.goal.pairs),
             inseparable=self.setup.inseparable,
             alike=self.setup.alike or None,
-            confused=self._confused(found.after[-1]),
-            unseen=self._unseen(found.after[-1]),
+            confused=confused(self.setup, found.after[-1]),
+            unseen=unseen(self.setup, found.after[-1]),
             columns=columns_needed(self.setup.system),
             rate_hz=self.setup.world.rate_hz,
             noise=_noise_words(self.setup.world),
@@ -149,7 +144,8 @@ class Telling:
             sized=bool(self.setup.world.beyond) or None,
             dear=tuple(dear_legs(self.setup, found)) or None if reached else None,
             calm=in_calm_water(self.setup, found) if reached else None,
-            untold=self._untold(found.after[-1]) or None,
+            untold=untold(self.setup, found.after[-1]) or None,
+            held=held(self.setup) or None,
             cautions=tuple(self._cautions(found, reached=reached)) or None,
         )
 
@@ -158,6 +154,7 @@ class Telling:
         setup, diagnosis = self.setup, self.setup.request.diagnosis
         if diagnosis is not None:
             yield from cautions_of(setup.case, setup.system, diagnosis)
+            yield from foreign_words(setup.foreign)
         yield from beyond_areas(setup, found.driven)
         if not (reached or setup.inseparable):
             yield from tight_areas(setup)
@@ -204,56 +201,6 @@ class Telling:
             dict(zip(names, map(float, pair.sizes), strict=True)),
             larger or None,
         )
-
-    def _confused(self, information: Array) -> tuple[str, ...]:
-        """Effects that, left free alone, would take what is asked."""
-        places = self.setup.judge.confusing(information)
-        return tuple(text_of(self.setup.system, self.setup.world.every[k]) for k in places)
-
-    def _untold(self, information: Array) -> tuple[Untold, ...]:
-        """What has to be known otherwise, with what it would leave of what is asked."""
-        found = taken_by(self.setup.untold, self.setup.goal, information, self.setup.judge.prior)
-        return tuple(
-            Untold(
-                text_of(self.setup.system, self.setup.world.every[effect]),
-                {self.setup.keys[k]: sigma for k, sigma in taken.items()},
-            )
-            for effect, taken in found.items()
-        )
-
-    def _unseen(self, information: Array) -> tuple[str, ...]:
-        """Effects of whose parameters the drive tells too little, whole or some of them.
-
-        Each effect with what is asked free beside it, not with all effects at once, of which some
-        are one: its sigma against the tolerance where one is asked, else against what is plausible.
-        """
-        groups: dict[str, list[int]] = {}
-        for k, one in enumerate(self.setup.world.every):
-            groups.setdefault(text_of(self.setup.system, one), []).append(k)
-        found = []
-        for text, places in groups.items():
-            hidden = self._hidden(information, places)
-            if hidden:
-                names = [self.setup.world.every[k].parameter.name for k in hidden]
-                found.append(text if len(hidden) == len(places) else f"{text}: {', '.join(names)}")
-        return tuple(found)
-
-    def _hidden(self, information: Array, places: Sequence[int]) -> list[int]:
-        """Of one effect's parameters those of which the drive tells too little."""
-        goal, prior = self.setup.goal, self.setup.judge.prior
-        asked = dict(zip(goal.wanted, goal.tolerance, strict=True))
-        own = dict(zip(goal.wanted, sigmas(information, list(goal.wanted)), strict=True))
-        index = sorted({*places, *goal.wanted})
-        beside = dict(zip(index, sigmas(information, index, prior[index]), strict=True))
-        return [
-            k
-            for k in places
-            if (
-                own[k] > asked[k]
-                if math.isfinite(asked.get(k, math.inf))
-                else beside[k] > UNSEEN * prior[k]
-            )
-        ]
 
     def _legs(self, found: WholeDrive) -> tuple[PlannedLeg, ...]:
         return tuple(
@@ -347,7 +294,7 @@ class Telling:
             self._correlation(drives.information),
             self.setup.judge.enough(drives.information),
             drives.cautions or None,
-            self._confused(drives.information) or None,
+            confused(self.setup, drives.information) or None,
         )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import field
 from typing import Final
@@ -67,6 +67,19 @@ class PlanWanted:
 
     reach: tuple[tuple[NamedEffect, float | None], ...] = ()
     pairs: tuple[EffectPair, ...] = ()
+
+    @property
+    def named(self) -> tuple[NamedEffect, ...]:
+        """Every effect in it, each once."""
+        both = (one for pair in self.pairs for one in (pair.first, pair.second))
+        return tuple(dict.fromkeys([*(one for one, _ in self.reach), *both]))
+
+    def without(self, left_out: Collection[NamedEffect]) -> PlanWanted:
+        """The rest without some effects, and without the pairs that they are in."""
+        return PlanWanted(
+            tuple(one for one in self.reach if one[0] not in left_out),
+            tuple(p for p in self.pairs if p.first not in left_out and p.second not in left_out),
+        )
 
 
 def named(text: str, option: str) -> NamedEffect:
@@ -248,25 +261,25 @@ def places(
     system: System, every: Sequence[Unknown], one: NamedEffect, option: str
 ) -> tuple[int, ...]:
     """Where the parameters of an effect stand among the unknowns; PlanError where it cannot act."""
-    stage = default_stage(system, one.sensor)
-    if one.stage is not None:
-        names = [s.name for s in system.stages]
-        if one.stage not in names:
-            raise PlanError(f"{option}: there is no stage {one.stage!r}, expected one of "
-                            f"{', '.join(names)}")  # fmt: skip
-        stage = names.index(one.stage)
-    found = tuple(
-        k
-        for k, u in enumerate(every)
-        if (u.candidate.effect.name, u.candidate.sensor, u.candidate.stage)
-        == (one.effect, one.sensor, stage)
-    )
+    label = label_of(system, one, option)
+    found = tuple(k for k, u in enumerate(every) if u.candidate.label == label)
     if not found:
         known = sorted({text_of(system, u) for u in every})
         raise PlanError(f"{option}: {one.text} does not apply to stage "
-                        f"{system.stages[stage].name!r} of this system; what does: "
+                        f"{system.stages[label[2]].name!r} of this system; what does: "
                         f"{', '.join(known)}")  # fmt: skip
     return found
+
+
+def label_of(system: System, one: NamedEffect, option: str) -> tuple[str, str, int]:
+    """Effect, sensor and place of the stage that are meant; PlanError where there is none such."""
+    if one.stage is None:
+        return one.effect, one.sensor, default_stage(system, one.sensor)
+    names = [s.name for s in system.stages]
+    if one.stage not in names:
+        raise PlanError(f"{option}: there is no stage {one.stage!r}, expected one of "
+                        f"{', '.join(names)}")  # fmt: skip
+    return one.effect, one.sensor, names.index(one.stage)
 
 
 def goal_of(
