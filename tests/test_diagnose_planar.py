@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from syncline_design.spec.load import BadInput
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Array]
@@ -234,3 +235,43 @@ def test_a_heading_that_is_off_is_not_a_mounting_with_three_angles(tmp_path: Pat
     assert low <= np.radians(1.5) <= high
     assert height.effect in ("lever_arm", "datum_offset")
     assert {one.effect for one in turned.aliases} >= {"boresight", "mounting"}
+
+
+def without(log: Path, *names: str) -> Path:
+    """The log less some columns."""
+    lines = [line.split(",") for line in log.read_text("utf-8").splitlines()]
+    kept = [k for k, name in enumerate(lines[0]) if name not in names]
+    text = "\n".join(",".join(line[k] for k in kept) for line in lines)
+    log.write_text(text + "\n", "utf-8")
+    return log
+
+
+def seen_from(folder: Path, height_m: float) -> tuple[Path, Path]:
+    """A scan of points below the robot at their true elevations; level at no height."""
+    spec, log = scanned(folder, normal, 3, rows=FEW)
+    table = np.genfromtxt(log, delimiter=",", names=True)
+    names = list(table.dtype.names or ())
+    columns = {name: np.array(table[name]) for name in names}
+    level = columns["range_m"]
+    columns["position_down_m"] = columns["position_down_m"] - height_m
+    columns["range_m"] = np.hypot(level, height_m)
+    columns["elevation_deg"] = -np.degrees(np.arctan2(height_m, level))
+    rows = np.stack(list(columns.values()), axis=1)
+    np.savetxt(log, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+    return spec, log
+
+
+def test_elevations_that_are_left_out_and_were_not_zero_are_no_noise(tmp_path: Path) -> None:
+    """From 6 m above what it sees, ranges were "70 times" as loud without them."""
+    spec, log = seen_from(tmp_path, 6.0)
+    assert diagnose(spec, [log], DiagnosisSettings(seed=0)).verdict == "agrees"
+    with pytest.raises(BadInput, match=r"column is missing: elevation_deg") as refused:
+        diagnose(spec, [without(log, "elevation_deg")], DiagnosisSettings(seed=0))
+    assert "log.csv:1:1" in str(refused.value)
+
+
+def test_a_level_scan_may_leave_its_elevations_out_beside_heights(tmp_path: Path) -> None:
+    spec, log = seen_from(tmp_path, 0.0)
+    found = diagnose(spec, [without(log, "elevation_deg")], DiagnosisSettings(seed=0))
+    assert found.verdict == "agrees"
+    assert any("taken as zero: elevation_deg" in note for note in found.log.notes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Final
 
 from syncline_design.comparison.assumptions import Assumed
@@ -45,9 +45,15 @@ class InStretches:
     kind: str = ""
 
     def standing(self, one: Assumed) -> Judgement | None:
-        """What stands out and turns the verdict: of this assumption, or perhaps of it."""
+        """What stands out and turns the verdict: of this assumption, or perhaps of it.
+
+        Of several stretches that break it the figure is of the largest departure, and all are said.
+        """
         said = [j for s in self.found.stands if (j := self._of(s, one)) is not None]
-        return next((j for j in said if j.status == "broken"), said[0] if said else None)
+        broken = sorted((j for j in said if j.status == "broken"), key=_size, reverse=True)
+        if not broken:
+            return said[0] if said else None
+        return replace(broken[0], words="; ".join(j.words for j in broken))
 
     def in_doubt(self) -> Iterator[InDoubt]:
         """What stands out beyond doubt beside what fits as well; all of it turns the verdict."""
@@ -207,6 +213,10 @@ class InStretches:
         return NORMAL_95 / NEARLY_ALL * widest
 
 
+def _size(said: Judgement) -> float:
+    return 0.0 if said.measured is None else abs(said.measured.value or 0.0)
+
+
 def _sizes(lengths: Sequence[float], worst: Sequence[ShownSize], at: int) -> Iterator[str]:
     """What shows in the least stretch, and in one of about a second."""
     short = next((k for k, length in enumerate(lengths) if length >= TOLD_S), 0)
@@ -221,7 +231,13 @@ def _found(s: Stands) -> str:
     if s.frozen:
         oldest = format_duration(rounded(s.values[0], 3))
         return f"{s.label[1]} repeats one reading, in the end {oldest} old,"
-    return f"{of_stretch(s).words} stands out"
+    part = of_stretch(s)
+    if s.ends is not None:
+        unit = next(iter(part.parameters.values())).unit
+        before, after = (amount(end, unit) for end in s.ends)
+        how = "grows" if abs(s.ends[1]) > abs(s.ends[0]) else "falls"
+        return f"{part.name} that {how} from {before} to {after} stands out"
+    return f"{part.words} stands out"
 
 
 def _in_its_place(s: Stands) -> list[OtherFit]:
@@ -249,4 +265,5 @@ def _values(s: Stands | OtherFit) -> dict[str, float]:
 
 def _placed(s: Stands) -> str:
     """Between which stamps."""
-    return f"from {to_digits(s.from_s, 6)} s to {to_digits(s.to_s, 6)} s"
+    single = f"in {len(s.stamps_s)} single rows " if s.stamps_s else ""
+    return f"{single}from {to_digits(s.from_s, 6)} s to {to_digits(s.to_s, 6)} s"

@@ -8,7 +8,7 @@ with every one of them, which no constant fits.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Final
@@ -21,15 +21,19 @@ from syncline_design.diagnosis.episodes import without_episodes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.instead import InItsPlace, in_place
+from syncline_design.diagnosis.late_runs import late_runs
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
+from syncline_design.diagnosis.looked_up import Mask
 from syncline_design.diagnosis.noise_split import NoiseFactors, factors
 from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import SearchedLog, examined, told
-from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.spans import span_of
+from syncline_design.diagnosis.stretch_ends import MARGIN_ROWS
 from syncline_design.diagnosis.stretches import (
+    OtherFit,
     Stands,
     Stretches,
     in_stretches,
@@ -84,7 +88,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
         inputs = measured(case, paths)
         one = examined(inputs, settings)
         beyond = beyond_limits(one.data.view)
-        held, taken = _held(inputs, one.data), list[Stands]()
+        held, taken = _held(inputs, one), list[Stands]()
         seen = Stretches(held) if held else _seen(one)
         for _ in range(ROUNDS + bool(held)):
             sure = [s for s in seen.stands if s.sure]
@@ -112,9 +116,41 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
         )
 
 
-def _held(inputs: Measured, data: Data) -> tuple[Stands, ...]:
-    """Rows of a log that repeat a reading while the vehicle moves on, as delays by their age."""
+def _held(inputs: Measured, one: SearchedLog) -> tuple[Stands, ...]:
+    """Rows of a log that repeat a reading while the vehicle moves on, as delays by their age, and
+    those that are late by more than their motion can be carried on."""
     view = scene(inputs.system, inputs.log, inputs.known)
+    repeated = _repeated(inputs, view, one.data)
+    if one.faults:  # what is grossly wrong with all rows is undone in none of these
+        return repeated
+    held = np.zeros(len(view), bool)
+    for each in repeated:
+        held |= (view.log.time_s >= each.from_s) & (view.log.time_s <= each.to_s)
+    return (*repeated, *_late(inputs, view, one.data, held))
+
+
+def _late(inputs: Measured, view: Scene, data: Data, held: Mask) -> Iterator[Stands]:
+    """Delays for a while that readings of other rows show, with what is the same delay."""
+    time_s, delay = inputs.log.time_s, plain_delay()
+    usual_m = max(expected_rms_m(data), 1e-300)
+    stage, names = inputs.system.stages[0].name, (delay.parameters[0].name,)
+    for first, *others in late_runs(view, held):
+        fits = tuple(
+            OtherFit((delay.name, each.sensor, 0), stage, names, (each.delay_s,), (each.spread_s,))
+            for each in others
+        )
+        share = math.sqrt(float(np.sum(first.off_m**2)) / len(time_s)) / usual_m
+        stamps_s = time_s[first.rows]
+        yield Stands(
+            (delay.name, first.sensor, 0), stage, float(stamps_s[0]), float(stamps_s[-1]), names,
+            (first.delay_s,), (first.spread_s,), -math.inf, True, fits, inside=True,
+            margin_s=0.0 if first.single else MARGIN_ROWS * inputs.log.interval_s, share=share,
+            explained=1.0, ends=first.ends_s,
+            stamps_s=tuple(map(float, stamps_s)) if first.single else (),
+        )  # fmt: skip
+
+
+def _repeated(inputs: Measured, view: Scene, data: Data) -> tuple[Stands, ...]:
     time_s, delay = inputs.log.time_s, plain_delay()
     usual_m = max(expected_rms_m(data), 1e-300)
     return tuple(
@@ -152,7 +188,7 @@ def _apart(stands: tuple[Stands, ...]) -> tuple[Stands, ...]:
 
     Where a window of a delay looked like a turn, and was left out, the rest of it is that delay.
     """
-    goes = [s for s in stands if s.sure and registry()[s.label[0]].passing]
+    goes = [s for s in stands if s.sure and registry()[s.label[0]].passing and not s.stamps_s]
     return tuple(
         s for s in stands
         if s in goes or not s.inside
@@ -190,6 +226,9 @@ def _less(inputs: Measured, taken: Sequence[Stands], least: float) -> Measured |
     time_s = inputs.log.time_s
     inside = np.zeros(len(time_s), bool)
     for one in taken:
+        if one.stamps_s:
+            inside |= np.isin(time_s, one.stamps_s)
+            continue
         inside |= (time_s >= one.from_s - one.margin_s) & (time_s <= one.to_s + one.margin_s)
     if not np.any(inside) or np.sum(~inside) < least:
         return None

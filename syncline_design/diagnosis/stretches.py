@@ -75,6 +75,8 @@ class Stands:
     noise_of: the sensors whose slow noise does there as well; none of a constant beyond doubt.
     explained: the part of the square of what is left there that it makes up.
     frozen: whether it is one reading that is given over and over, of which the value is the age.
+    ends: of one that grows or falls, what it is at either end; the value is the larger.
+    stamps_s: of single rows with sound ones between, those that it acts in.
     """
 
     label: Label
@@ -93,6 +95,8 @@ class Stands:
     noise_of: tuple[str, ...] = ()
     frozen: bool = False
     explained: float = 0.0
+    ends: tuple[float, float] | None = None
+    stamps_s: tuple[float, ...] = ()
 
     @property
     def others(self) -> tuple[Label, ...]:

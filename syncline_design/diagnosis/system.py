@@ -9,6 +9,7 @@ from pathlib import Path
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis.gross import Reread, mended
+from syncline_design.diagnosis.level import demand_level
 from syncline_design.effects.acting import Acting, acting_of
 from syncline_design.logs.columns import ISO_TIMES, known_names, shown
 from syncline_design.logs.log import Log
@@ -62,6 +63,8 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
         system = replace(system, stages=(replace(system.stages[0], ranging=None),))
     _demand_fit(case, system, log)
     known = acting_of(system)
+    if files:
+        demand_level(files[0], system, log, known)
     for one in known:
         if one.effect.kind == "discrete":
             log = mended(log, one, reread)

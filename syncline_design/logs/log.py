@@ -85,6 +85,8 @@ class Log:
     laid: the turns (beside a shift) by which the truth was laid onto what was measured, where
     nothing relates their frames: what is constant between the two is then no witness of anything.
     since_s: what the stamps count from [s since 1970] where they were calendar times, else 0.
+    level: columns that a 2-D log leaves out, taken as zero.  hidden_down_m: (n,) how far down its
+    targets are told to be, where that is not compared.
     """
 
     kind: LogKind
@@ -98,6 +100,8 @@ class Log:
     thinned: int = 0
     laid: Turns | None = None
     since_s: float = 0.0
+    level: tuple[str, ...] = ()
+    hidden_down_m: Array | None = None
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])
@@ -110,6 +114,7 @@ class Log:
             stages=tuple(stage.rows(index) for stage in self.stages),
             truth_m=self.truth_m[index],
             target_id=None if self.target_id is None else self.target_id[index],
+            hidden_down_m=None if self.hidden_down_m is None else self.hidden_down_m[index],
         )
 
     @property

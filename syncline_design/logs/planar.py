@@ -21,14 +21,17 @@ from syncline_design.logs.columns import (
 from syncline_design.logs.log import LogKind
 
 DOWN, ELEVATION = 2, 2
+HIDDEN_DOWN = "target down, not compared"  # column of what targets are told where it is left out
 
 
-def filled(columns: dict[str, Array], prefixes: Sequence[str], kind: LogKind) -> list[str]:
-    """Add the level columns that a 2-D log leaves out; what was taken as zero, for people.
+def filled(
+    columns: dict[str, Array], prefixes: Sequence[str], kind: LogKind
+) -> tuple[list[str], tuple[str, ...]]:
+    """Add the level columns that a 2-D log leaves out; notes for people, and which were added.
 
     Each of these may be missing if what belongs to it is there: down (beside north and east), roll
     and pitch together (beside yaw), elevation (beside range and azimuth).  Down is compared only
-    where positions, targets and elevations all tell it.
+    where positions, targets and elevations all tell it; what targets are told stays as HIDDEN_DOWN.
     """
     level: list[str] = []
     flat = _fill(columns, [prefixes[0] + n for n in POSITION], (DOWN,), level)
@@ -44,11 +47,13 @@ def filled(columns: dict[str, Array], prefixes: Sequence[str], kind: LogKind) ->
     if kind == "georeference":
         flat |= _fill(columns, truth, (DOWN,), [])
     if flat:
+        if known and level:
+            columns[HIDDEN_DOWN] = columns[truth[DOWN]]
         columns[truth[DOWN]] = np.full(columns[TIME].shape, np.nan)
     notes = [f"not in the log, taken as zero: {', '.join(map(shown, level))}"] if level else []
     if flat and (known or kind == "georeference"):
         notes.append("down is not compared: the log does not hold all that tells it")
-    return notes
+    return notes, tuple(map(shown, level))
 
 
 def _fill(

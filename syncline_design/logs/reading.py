@@ -51,6 +51,7 @@ class _Draft:
     notes: list[str] = field(default_factory=list)
     follows_position: bool = False
     velocity_of_reference: bool = False
+    level: tuple[str, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -89,7 +90,8 @@ def read_log(
     )
     draft.notes += said
     kind = _kind(draft, prefixes, needs_ranging, pose_lever_m)
-    draft.notes += planar.filled(draft.columns, prefixes, kind)
+    notes, draft.level = planar.filled(draft.columns, prefixes, kind)
+    draft.notes += notes
     _demand_columns(draft, prefixes, kind)
     rejected = dict(draft.table.rejected)
     draft.columns, missing = _complete_rows(draft, prefixes, kind)
@@ -228,6 +230,8 @@ def _log(
         notes=tuple(draft.notes),
         thinned=draft.table.thinned,
         since_s=draft.table.since_s,
+        level=draft.level,
+        hidden_down_m=draft.columns.get(planar.HIDDEN_DOWN),
     )
 
 

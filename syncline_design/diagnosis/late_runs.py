@@ -1,0 +1,188 @@
+"""Rows that are late by far more than their motion can be carried on, found in other rows.
+
+A delay is undone elsewhere by carrying a pose on by its rates and velocities.  Where the attitude
+is late by half a second or a second its rates mostly are as well, and what turned during the last
+of that time is in no row at all: neither way of reading the rates fits, and noise of a sound sensor
+fits as well as anything.  Single late rows among sound ones are noise to a fit of any kind.  But
+the readings themselves are in the log (`looked_up`).  Of rows far beyond noise, in a run or single,
+    Q(L) = sum e' C^-1 e
+is asked of every device on a grid of L, then by Gauss-Newton; of a run that no constant fits, of a
+delay that grows or falls evenly as well.  What is left has to be noise, Q <= chi-square of 1 in
+10 000, the noise as loud as the median row of the log shows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from syncline_design.diagnosis.looked_up import (
+    LEAST_ROWS,
+    Index,
+    LateRows,
+    LookedUp,
+    Mask,
+    Weighed,
+)
+from syncline_design.diagnosis.scene import Scene
+from syncline_design.diagnosis.stretches import is_inside
+from syncline_design.effects.record import ActsOn, Array
+from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import chi_square_limit
+
+FAR: Final = 1e-9  # chance of a row's square, beyond which it is no noise
+APART_S, APART_ROWS = 1.0, 3  # of two such rows of one run, at most
+DENSE: Final = 0.5  # of the rows of a run, that are far off
+MOST_RUNS: Final = 8  # the longest ones
+MOST_OF_LOG: Final = 0.6  # in runs: beyond that it is no while
+MOST_SINGLE: Final = 0.3  # of a log
+LEAST_S, MOST_S = 0.1, 10.0  # of a delay: a shorter one is carried on by its motion
+LEAST_SINGLE_S: Final = 0.02  # of single rows, which no motion carries on
+GRID_S: Final = 0.05
+FINER, TIMES = 10, 2  # delays to either side of the best, and how often
+ONE: Final = (1.0,)  # a delay of one value
+GROWING: Final = ((0.0, 1.0), (1.0, 0.0))  # or falling
+MOST_GROWN_S: Final = 2.0
+NEAR_S: Final = 1e-3  # to either side, over which errors are straight lines in a delay
+POLISHED: Final = 4  # steps
+CHANCE: Final = 1e-4  # that noise is louder than what is taken for noise
+BETTER_NATS: Final = 5.0  # by which a single row has to be late rather than sound
+
+
+@dataclass(frozen=True, slots=True)
+class Late:
+    """A device that is late (or early) in some rows, by how much at most, and how far that puts
+    them off [m].  ends_s: of a delay that grows or falls, the first and last one.  single: whether
+    sound rows lie between."""
+
+    sensor: ActsOn
+    rows: Index
+    delay_s: float
+    spread_s: float
+    off_m: Array
+    ends_s: tuple[float, float] | None = None
+    single: bool = False
+
+
+def late_runs(view: Scene, held: Mask) -> list[tuple[Late, ...]]:
+    """Of every run within a log of one vehicle, and of the single rows, each device that fits, what
+    is late before what is early.  held: rows of which more is known already."""
+    log = view.log
+    if len(view.system.stages) != 1 or log.stages[0].antenna_m is None:
+        return []
+    weighed = Weighed.of(view)
+    far = (weighed.square > chi_square_limit(FAR, weighed.freedom)) & ~held
+    if np.mean(far) > MOST_OF_LOG or np.sum(far) < LEAST_ROWS:
+        return []
+    asked = list(_asked(weighed, far, held))
+    found = [tuple(_fits(one)) for one in asked]
+    return [fits for fits in found if fits]
+
+
+def _asked(weighed: Weighed, far: Mask, held: Mask) -> Iterator[LateRows]:
+    """Runs, the longest first, then the rows that are far off in none of them."""
+    runs = list(_runs(weighed.time_s, far, held))
+    in_runs = np.zeros(len(far), bool)
+    for run in runs:
+        in_runs |= run
+    for run in runs[:MOST_RUNS]:
+        yield LateRows(weighed, run, held | (in_runs & ~run))
+    single = far & ~in_runs
+    if LEAST_ROWS <= np.sum(single) <= MOST_SINGLE * len(far):
+        yield LateRows(weighed, single, held | in_runs, single=True)
+
+
+def _runs(time_s: Array, far: Mask, held: Mask) -> Iterator[Mask]:
+    """What lies far off side by side, the longest first."""
+    at = np.flatnonzero(far)
+    apart = (np.diff(time_s[at]) > APART_S) & (np.diff(at) > APART_ROWS)
+    parts = np.split(at, np.flatnonzero(apart) + 1)
+    ends_s = float(time_s[0]), float(time_s[-1])
+    for part in sorted(parts, key=len, reverse=True):
+        rows = np.zeros(len(far), bool)
+        rows[part[0] : part[-1] + 1] = True
+        dense = len(part) >= max(LEAST_ROWS, DENSE * np.sum(rows)) and not np.any(held & rows)
+        if dense and is_inside(float(time_s[part[0]]), float(time_s[part[-1]]), ends_s):
+            yield rows
+
+
+def _fits(asked: LateRows) -> Sequence[Late]:
+    ranged = asked.of.view.log.kind == "georeference"
+    devices: tuple[ActsOn, ...] = ("position", "attitude", "ranging") if ranged else ("position",)
+    found = [one for sensor in devices if (one := _late(asked, sensor)) is not None]
+    return sorted(found, key=lambda one: one.delay_s < 0.0)
+
+
+def _late(asked: LateRows, sensor: ActsOn) -> Late | None:
+    """By how much a device is late, where that leaves nothing but noise."""
+    looked = LookedUp.of(asked, sensor)
+    if looked is None:
+        return None
+    log = asked.of.view.log
+    most_s = min(MOST_S, 0.5 * log.duration_s)
+    for shape in (ONE,) if asked.single else (ONE, *GROWING):
+        start = _on_a_grid(looked, np.array(shape), most_s if shape == ONE else MOST_GROWN_S)
+        told = None if start is None else _at_least(looked, start)
+        if told is None:
+            continue
+        delays, spreads = told
+        largest = int(np.argmax(np.abs(delays)))
+        if abs(float(delays[largest])) >= (LEAST_SINGLE_S if asked.single else LEAST_S):
+            rows = _single(looked, delays) if asked.single else np.flatnonzero(asked.inside)
+            off_m = np.linalg.norm(np.nan_to_num(asked.of.view.error())[rows], axis=1)
+            ends_s = None if len(delays) < 2 else (float(delays[0]), float(delays[1]))
+            return Late(sensor, rows, float(delays[largest]), float(spreads[largest]), off_m,
+                        ends_s, asked.single)  # fmt: skip
+    return None
+
+
+def _single(looked: LookedUp, delays: Array) -> Index:
+    """Those far off, and others that are late rather than sound."""
+    late = looked.late
+    anywhere = looked.known(delays, ~late.elsewhere)
+    square = np.sum(looked.left(delays, anywhere) ** 2, axis=1)
+    better = 0.5 * (late.of.square[anywhere] - square) > BETTER_NATS
+    own = late.inside.copy()
+    own[anywhere[better]] = True
+    return np.flatnonzero(own)
+
+
+def _on_a_grid(looked: LookedUp, shape: Array, most_s: float) -> Array | None:
+    """The delays of a shape times one size that leave least; None where none has its readings."""
+    grid, step_s, best_s = np.arange(-most_s, most_s + GRID_S, GRID_S), GRID_S, 0.0
+    for _ in range(TIMES):
+        means = [looked.mean_square(float(size) * shape) for size in grid]
+        if not np.isfinite(means).any():
+            return None
+        best_s = float(grid[int(np.argmin(means))])
+        grid = best_s + step_s * np.linspace(-1.0, 1.0, 2 * FINER + 1)
+        step_s /= FINER
+    return best_s * shape
+
+
+def _at_least(looked: LookedUp, delays: Array) -> tuple[Array, Array] | None:
+    """The delays of least Q nearby and their spreads (Gauss-Newton); None where more than noise is
+    left."""
+    rows = looked.rows(delays)
+    for _ in range(POLISHED):
+        if rows is None:
+            return None
+        left = looked.left(delays, rows)
+        steps = NEAR_S * np.eye(len(delays))
+        slopes = [looked.left(delays + d, rows) - looked.left(delays - d, rows) for d in steps]
+        columns = np.stack([slope.ravel() for slope in slopes], axis=1) / (2.0 * NEAR_S)
+        normal = columns.T @ columns
+        if not float(np.min(np.linalg.eigvalsh(normal))) > 0.0:
+            return None
+        delays = delays - np.linalg.solve(normal, columns.T @ left.ravel())
+        rows = looked.rows(delays)
+    if rows is None:
+        return None
+    freedom = looked.components(rows) - len(delays)
+    square = float(np.sum(looked.left(delays, rows) ** 2))
+    if freedom < 1 or square > chi_square_limit(CHANCE, freedom):
+        return None
+    spread2 = max(square / freedom, 1.0) * np.diag(np.linalg.inv(normal))
+    return delays, np.sqrt(spread2)
