@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from syncline_design.campaign.changes import REACH, Changes, weight_of
+from syncline_design.campaign.changes import DRIFT, REACH, Changes
+from syncline_design.campaign.courses import Course, courses, log_weights, weight_of
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.scatter import APART, DIFFERING, log_odds_apart
 from syncline_design.diagnosis.sufficient import Sufficient
@@ -52,15 +53,18 @@ def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
     whole = [np.log(1.0 - sum(weight_of(k + 1) for k in range(1, 6)))]
     for c, term in enumerate(changes.terms):
         own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
-        size = REACH * np.linalg.cholesky(np.linalg.inv(normal.mean(0)[np.ix_(own, own)]))
-        for k in range(1, 6):
+        size = np.linalg.cholesky(np.linalg.inv(normal.mean(0)[np.ix_(own, own)]))
+        for row, (kind, k) in enumerate([*(("step", k) for k in range(1, 6)),
+                                         *(("drift", k) for k in range(1, 6))]):  # fmt: skip
             column = np.zeros((6 * p, len(own)))
             for r in range(k, 6):
-                column[[r * p + i for i in own]] = size
+                by = REACH if kind == "step" else DRIFT * (r - k + 1)
+                column[[r * p + i for i in own]] = by * size
             other = density(null + column @ column.T)
-            expected = np.log(weight_of(k + 1)) + changes.log_weights[c] + other - base
-            assert table[k - 1, c] == pytest.approx(expected, abs=1e-3)
-            whole.append(table[k - 1, c])
+            share = 0.9 if kind == "step" else 0.1
+            expected = np.log(share * weight_of(k + 1)) + changes.log_weights[c] + other - base
+            assert table[row, c] == pytest.approx(expected, abs=1e-3)
+            whole.append(table[row, c])
     apart = [0.0]
     for term in changes.terms:
         own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
@@ -141,11 +145,13 @@ def test_the_evidence_of_a_large_change_does_not_end() -> None:
     course = [changes.log_evidence(n)[0] for n in range(11, 25)]
     assert all(later > before > 0.0 for before, later in itertools.pairwise(course))
     place = [term.effect.name for term in changes.terms].index("latency")
-    assert changes.change(24, 10, place).log_factor > 1000.0
+    step = courses(24).index(Course("step", 10))
+    assert changes.change(24, step, place).log_factor > 1000.0
 
 
 def test_weights_of_all_runs_and_effects_share_the_false_alarms() -> None:
     assert sum(weight_of(k) for k in range(2, 200_000)) == pytest.approx(1.0, abs=0.01)
+    assert np.exp(log_weights(5)).sum() == pytest.approx(sum(map(weight_of, range(2, 6))))
     assert weight_of(2) > weight_of(3) > weight_of(100) > 0.001
     changes = Changes(pool_of(series(1, 2, 0.0 * BOUND, 9), range(2)))
     share = {t.effect.name: np.exp(w) for t, w in zip(changes.terms, changes.log_weights,

@@ -38,6 +38,7 @@ import numpy as np
 
 from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
+from syncline_design.campaign.courses import Course, courses, later, log_weights, shapes
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
 from syncline_design.campaign.scatter import (
@@ -55,35 +56,31 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
-EARLY: Final = 10.0  # runs after which a change is met half as often as at the first
+DRIFT: Final = 1.0  # bounds of one run: the change from run to run of the drift that is looked for
 SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
 AS_CLEAR: Final = 2.0  # standard deviations of Q by which effects differ as clearly
 MOST_SCATTERED: Final = 2
 
 
-def weight_of(k: int) -> float:
-    """Share of the false alarms that a change at the run k (from 2) may have."""
-    return _later(k) - _later(k + 1)
-
-
-def _later(k: int) -> float:
-    """Share of the changes at the run k (from 2) or later: what was mounted last moves first."""
-    return math.sqrt((EARLY + 2.0) / (EARLY + k))
-
-
 @dataclass(frozen=True, eq=False)
 class Change:
-    """One effect from one run on: d with its covariance, and log of the Bayes factor."""
+    """One effect from one run on: d (of a drift by run) with its covariance, and log of the Bayes
+    factor."""
 
     term: Term
-    k: int  # index of the first run that has it
+    course: Course
     values: Array
     covariance: Array
     log_factor: float
 
+    @property
+    def k(self) -> int:
+        """Place of the first run that has it."""
+        return self.course.k
+
     def is_of(self, other: Change) -> bool:
-        """Whether both are of one effect from one run on."""
-        return (self.term.label, self.k) == (other.term.label, other.k)
+        """Whether both are of one effect and of one course."""
+        return (self.term.label, self.course) == (other.term.label, other.course)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +116,14 @@ class Differing:
 
 
 @dataclass(frozen=True, slots=True)
+class Freed:
+    """N (2 (look - 1), G, p, p) and s (2 (look - 1), G, p) of every course, by group of terms."""
+
+    normals: tuple[Array, ...]
+    scores: tuple[Array, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Runs:
     """Information and score of runs, their sum with the prior and its inverse, and the scatter of
     each effect.
@@ -139,10 +144,13 @@ class Changes:
     """All changes that runs could show, in their order.
 
     kept: what looks at the first of these runs found, so that none of it is computed again.
+    beside: changes that are taken off; what is left of each is free beside all others, or the first
+    that is told would keep what it took of the second.
     """
 
     pool: Pool
     kept: tuple[KeptLook, ...] = ()
+    beside: tuple[Change, ...] = ()
 
     @cached_property
     def terms(self) -> tuple[Term, ...]:
@@ -198,15 +206,27 @@ class Changes:
         return found
 
     def log_evidence(self, look: int) -> tuple[float, Array]:
-        """log E_n of the first `look` runs, and log w_k w_c B_ck of every k from 1 and c."""
+        """log E_n of the first `look` runs, and log w_k w_c B_ck of every course and effect."""
         mixed, table = self.mixed(look)
         return mixed - self.doubt(look), table
 
     def mixed(self, look: int) -> tuple[float, Array]:
         """The same where no effect may differ from run to run: log sum w_k w_c B_ck."""
-        weights = np.array([weight_of(k + 1) for k in range(1, look)])
-        table = np.log(weights)[:, None] + self._factors(look) + self.log_weights
-        return float(np.logaddexp.reduce([*table.ravel(), math.log(_later(look + 1))])), table
+        table = self._weighted(look, self._freed(look), self.compared(look))
+        return float(np.logaddexp.reduce([*table.ravel(), math.log(later(look + 1))])), table
+
+    def _weighted(self, look: int, freed: Freed, runs: Runs) -> Array:
+        """log w_k w_c B_ck of every course and effect, (2 (look - 1), C)."""
+        found: Array = log_weights(look)[:, None] + self._factors(freed, runs, self.inside(look))
+        return found + self.log_weights
+
+    def likelihoods(self, look: int) -> Array:
+        """The same by one noise for all effects, that of the likeliest, so that they compare."""
+        runs, freed = self.compared(look), self._freed(look)
+        first = self._factors(freed, runs, np.ones(len(self.terms)))
+        noise = self.inside(look)[int(np.argmax(first)) % len(self.terms)]
+        found: Array = log_weights(look)[:, None] + self.log_weights
+        return found + self._factors(freed, runs, np.full(len(self.terms), noise))
 
     def doubt(self, look: int) -> float:
         """log (1 + sum p_a L_a): how much likelier the first runs are where some effect may differ
@@ -246,70 +266,79 @@ class Changes:
         evidence = self.log_evidence(look)[0] if look > 1 else 0.0
         return evidence, self.within_of(look - 1), self.between_of(look)
 
-    def _factors(self, look: int) -> Array:
-        """log B_ck of every k from 1 and c, (look - 1, C)."""
-        found = np.zeros((look - 1, len(self.terms)))
-        for group, normal, score in zip(self.groups, *self._freed(look), strict=True):
-            inside = self.inside(look)[group.terms]
-            found[:, group.terms] = log_bayes(
-                normal / inside[:, None, None],
-                score / inside[:, None],
-                self._reach(look, group),
-            )
+    def _factors(self, freed: Freed, runs: Runs, noise: Array) -> Array:
+        """log B_ck of every course and effect, (2 (look - 1), C), by their variances (C,)."""
+        steps = len(runs.normal) - 1
+        found = np.zeros((2 * steps, len(self.terms)))
+        for group, normal, score in zip(self.groups, freed.normals, freed.scores, strict=True):
+            inside = noise[group.terms]
+            usual = inverted(runs.normal.mean(axis=0)[group.blocks])
+            for rows, reach in ((slice(steps), REACH), (slice(steps, None), DRIFT)):
+                found[rows, group.terms] = log_bayes(
+                    normal[rows] / inside[:, None, None],
+                    score[rows] / inside[:, None],
+                    reach**2 * usual,
+                )
         return found
 
-    def change(self, look: int, k: int, c: int) -> Change:
-        """Effect c from run k on, by the first `look` runs."""
+    def change(self, look: int, row: int, c: int) -> Change:
+        """Effect c by one of the courses of the first `look` runs."""
+        runs, freed = self.compared(look), self._freed(look)
+        log_factor = float(self._factors(freed, runs, self.inside(look))[row, c])
+        one = self._fitted(look, freed, row, c)
+        covariance = float(self.temper(look)[row, c]) * one.covariance
+        return replace(one, covariance=covariance, log_factor=log_factor)
+
+    def _fitted(self, look: int, freed: Freed, row: int, c: int) -> Change:
+        """The same by the noise fitted."""
         group, at = next(
             (g, int(np.flatnonzero(own.terms == c)[0]))
             for g, own in enumerate(self.groups)
             if c in own.terms
         )
-        normal, score = (found[group][k - 1, at] for found in self._freed(look))
-        inverse = inverted(normal)
-        covariance = float(self.temper(look)[k - 1, c]) * inverse
-        log_factor = float(self._factors(look)[k - 1, c])
-        return Change(self.terms[c], k, inverse @ score, covariance, log_factor)
+        inverse = inverted(freed.normals[group][row, at])
+        values = inverse @ freed.scores[group][row, at]
+        return Change(self.terms[c], courses(look)[row], values, inverse, 0.0)
 
     def tells(self, look: int) -> list[Array]:
-        """Of every effect the information (p, p) that `look` runs have about a change with the
+        """Of every effect the information (p, p) that `look` runs have about a step with the
         last of them, by the scatter of runs and of their parts."""
         found: list[Array] = [np.zeros((term.size, term.size)) for term in self.terms]
-        factor = self.temper(look)[-1]
-        for group, normal in zip(self.groups, self._freed(look)[0], strict=True):
-            for place, own in zip(group.terms, normal[-1], strict=True):
+        last = courses(look).index(Course("step", look - 1))
+        factor = self.temper(look)[last]
+        for group, normal in zip(self.groups, self._freed(look).normals, strict=True):
+            for place, own in zip(group.terms, normal[last], strict=True):
                 found[int(place)] = own / factor[place]
         return found
 
     @cached_property
-    def _last(self) -> dict[int, tuple[list[Array], list[Array]]]:
+    def _last(self) -> dict[int, Freed]:
         return {}
 
-    def _freed(self, look: int) -> tuple[list[Array], list[Array]]:
-        """N (look - 1, G, p, p) and s (look - 1, G, p) of every k from 1, by group of terms."""
-        if look in self._last:
-            return self._last[look]
-        runs = self.compared(look)
-        normal, score, inverse = runs.normal, runs.score, runs.inverse
-        later = np.cumsum(normal[::-1], axis=0)[::-1][1:]
-        scores = np.cumsum(score[::-1], axis=0)[::-1][1:]
-        cross = later @ inverse
-        freed = scores - cross @ score.sum(axis=0)
-        normals = [
-            later[:, *g.blocks] - cross[:, g.index] @ np.swapaxes(later[:, g.index], -1, -2)
-            for g in self.groups
-        ]
-        self._last.clear()
-        self._last[look] = normals, [freed[:, g.index] for g in self.groups]
+    def _freed(self, look: int) -> Freed:
+        """N and s of every course, by the first `look` runs."""
+        if look not in self._last:
+            found = self._freed_of(self.compared(look))
+            self._last.clear()
+            self._last[look] = found
         return self._last[look]
 
-    def _reach(self, look: int, group: Group) -> Array:
-        """D (G, p, p): REACH^2 times one run's covariance, by how the runs were driven."""
-        return REACH**2 * inverted(self.compared(look).normal.mean(axis=0)[group.blocks])
+    def _freed_of(self, runs: Runs) -> Freed:
+        """The same of some runs, what differs from one to the next freed in them."""
+        over = shapes(len(runs.normal))
+        summed = np.tensordot(over, runs.normal, axes=1)
+        cross = summed @ runs.inverse
+        scores = over @ runs.score - cross @ runs.score.sum(axis=0)
+        normals = []
+        for g in self.groups:
+            own = np.tensordot(np.square(over), runs.normal[:, *g.blocks], axes=1)
+            taken = cross[:, g.index] @ np.swapaxes(summed[:, g.index], -1, -2)
+            normals.append(own - taken)
+        return Freed(tuple(normals), tuple(scores[:, g.index] for g in self.groups))
 
     def temper(self, look: int) -> Array:
-        """Variance over that fitted, of every k from 1 and c: inside runs, and between them."""
-        found = np.zeros((look - 1, len(self.terms)))
+        """Variance over that fitted, of every course and effect: inside runs, and between them."""
+        found = np.zeros((2 * (look - 1), len(self.terms)))
         for group, scatter in zip(self.groups, self.compared(look).scatters, strict=True):
             found[:, group.terms] = scatter.factor[:-1]
         return np.asarray(self.inside(look) * found)
@@ -337,31 +366,66 @@ class Changes:
         return {}
 
     def compared(self, look: int) -> Runs:
-        """The first `look` runs, what clearly differs from one to the next freed in each."""
+        """The first `look` runs, what clearly differs from one to the next freed in each.
+
+        What the likeliest change makes is no scatter, of its own effect or of one that moves the
+        runs alike.
+        """
         if look not in self._latest:
-            found = self._compared(look, self.pool.normal[:look], self.pool.score[:look])
+            found = self._compared(look, *self._side_by_side(look))
+            likely = self._likeliest_of(look, found) if look > 2 else None
+            if likely is not None:
+                found = self._compared(look, found.normal, found.score, likely)
             for _ in range(MOST_SCATTERED):
                 one = self._scattering(found)
                 if one is None:
                     break
                 freed = (*found.freed, one)
-                own = one.term.index, one.covariance
-                found = self._compared(look, *freed_of(found.normal, found.score, *own))
-                found = replace(found, freed=freed)
+                own = freed_of(found.normal, found.score, one.term.index, one.covariance)
+                found = replace(self._compared(look, *own, likely), freed=freed)
             self._latest.clear()
             self._latest[look] = found
         return self._latest[look]
+
+    def likeliest(self, look: int) -> Change | None:
+        """The likeliest change by the first `look` runs and the noise fitted; None where none is
+        likelier."""
+        return self._likeliest_of(look, self.compared(look))
+
+    def _likeliest_of(self, look: int, runs: Runs) -> Change | None:
+        freed = self._freed_of(runs)
+        table = self._weighted(look, freed, runs)
+        row, c = np.unravel_index(int(np.argmax(table)), table.shape)
+        return self._fitted(look, freed, int(row), int(c)) if table[row, c] > 0.0 else None
+
+    def _side_by_side(self, look: int) -> tuple[Array, Array]:
+        """Information and score of the first runs, what is beside as parameters after all others:
+        of a change of course h they have h times the columns of its effect."""
+        normal, score = self.pool.normal[:look], self.pool.score[:look]
+        if not self.beside:
+            return normal, score
+        index = np.concatenate([np.arange(score.shape[1]), *(b.term.index for b in self.beside)])
+        over = [np.repeat(b.course.over(look)[:, None], b.term.size, axis=1) for b in self.beside]
+        grown: Array = np.concatenate([np.ones_like(score), *over], axis=1)
+        squares = grown[:, :, None] * grown[:, None, :]
+        return normal[:, index[:, None], index] * squares, score[:, index] * grown
 
     def differing(self, look: int) -> tuple[Differing, ...]:
         """Effects that clearly differ from run to run, of the first `look` runs."""
         return self.compared(look).freed
 
-    def _compared(self, look: int, normal: Array, score: Array) -> Runs:
+    def _compared(
+        self, look: int, normal: Array, score: Array, likely: Change | None = None
+    ) -> Runs:
         """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
-        together; parted at every k from 1, and not parted."""
+        together, less what a likely change makes; beside every course of the effect, and alone."""
         total = self.total(look, normal, score)
         inverse = pseudo_inverse(total)
-        left = score - normal @ (inverse @ score.sum(axis=0))
+        left = score
+        if likely is not None:
+            made = normal[:, :, likely.term.index] @ likely.values
+            left = score - likely.course.over(look)[:, None] * made
+        left = left - normal @ (inverse @ left.sum(axis=0))
         found = []
         for g in self.groups:
             blocks = normal[:, *g.blocks]
@@ -374,7 +438,7 @@ class Changes:
 
     def _scattering(self, runs: Runs) -> Differing | None:
         """The effect that differs most clearly from run to run; None where noise would do.  One
-        change is none: runs are parted at any."""
+        change of it is none, of any course."""
         if not self.terms:
             return None
         clear, excess, chance = (np.zeros(len(self.terms)) for _ in range(3))
@@ -399,25 +463,46 @@ class Changes:
         )
 
     def total(self, look: int, normal: Array, score: Array) -> Array:
-        """Information of runs together, with the prior of what they show."""
-        total = normal.sum(axis=0)
-        prior, held = np.diag(total) / PLAUSIBLE**2, np.zeros_like(total)
+        """Information of runs, with the prior of what they show; what is beside is free."""
+        found, size = normal.sum(axis=0), len(self.pool.labels)
+        total, scores = _marginal(found, score.sum(axis=0), size)
+        prior, held = np.diag(found)[:size] / PLAUSIBLE**2, np.zeros_like(total)
         groups = tuple((g.terms, g.index) for g in self.groups)
-        for one in shown_constants(total, score.sum(axis=0), groups, self.inside(look)):
+        for one in shown_constants(total, scores, groups, self.inside(look)):
             prior[one.index] = 0.0
             held[np.ix_(one.index, one.index)] = one.prior
-        found: Array = total + held + np.diag(np.maximum(prior, self.prior))
-        return found
+        found[:size, :size] += held + np.diag(np.maximum(prior, self.prior))
+        return np.asarray(found)
 
-    def without(self, one: Change) -> Changes:
-        """The same runs with a change taken off those that have it."""
+    def without(self, *ones: Change) -> Changes:
+        """The same runs with changes taken off those that have them."""
         score = self.pool.score.copy()
-        score[one.k :] -= self.pool.normal[one.k :][:, :, one.term.index] @ one.values
-        pool = Pool(self.pool.labels, self.pool.normal, score, self.pool.gram, self.pool.less,
-                    self.pool.starts)  # fmt: skip
-        found = Changes(pool)
+        for one in ones:
+            made = self.pool.normal[:, :, one.term.index] @ one.values
+            score -= one.course.over(self.pool.count)[:, None] * made
+        return self._of(replace(self.pool, score=score), self.beside)
+
+    def taking(self, one: Change) -> Changes:
+        """The same, what is left of the change free beside all others."""
+        return self._of(self.without(one).pool, (*self.beside, one))
+
+    def alone(self) -> Changes:
+        """The same runs, nothing free beside."""
+        return self._of(self.pool, ())
+
+    def _of(self, pool: Pool, beside: tuple[Change, ...]) -> Changes:
+        found = Changes(pool, (), beside)
         found.__dict__["within"] = self.within  # the scatter inside runs is what it was
         return found
+
+
+def _marginal(total: Array, score: Array, size: int) -> tuple[Array, Array]:
+    """The first so many parameters, the others free."""
+    if len(total) == size:
+        return total, score
+    across = total[:size, size:] @ inverted(total[size:, size:])
+    left: Array = score[:size] - across @ score[size:]
+    return total[:size, :size] - across @ total[size:, :size], left
 
 
 def _own_covariance(normal: Array, term: Term) -> Array:

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.changes import Change, Changes
+from syncline_design.campaign.courses import courses
 from syncline_design.campaign.looks import KeptLook, keys_of, known_first
 from syncline_design.campaign.pool import Pool, Term, inverted, pool_of
 from syncline_design.campaign.store import Entry, Stored, by_date
@@ -118,20 +119,20 @@ class ComparedRuns:
         changes, look = self.changes, len(self.runs)
         for _ in range(2 * MOST_CHANGES):
             at = look
-            total, table = changes.log_evidence(at)
+            total = changes.log_evidence(at)[0]
             if found and (total < self.threshold or len(found) == MOST_CHANGES):
                 break
             if not found and total < math.log(2.0):  # it went back, which is a change of its own
                 at = first
-                total, table = changes.log_evidence(at)
-            one = _best(changes, at, table, first, total)
-            changes = changes.without(one.change)
+                total = changes.log_evidence(at)[0]
+            one = _best(changes, at, first, total)
+            changes = changes.taking(one.change)
             same = [k for k, other in enumerate(found) if other.change.is_of(one.change)]
             for k in same:  # what was left of one that is told already
                 found[k] = found[k].grown(one.change.values)
             if not same:
                 found.append(one)
-        return _at_once(found, changes, look, self.threshold)
+        return _at_once(found, changes.alone(), look, self.threshold)
 
     @property
     def _rang(self) -> int | None:
@@ -179,45 +180,50 @@ def _explained(change: Change) -> float:
 def _fitted_together(changes: Changes, ones: Sequence[Change], look: int) -> list[Change]:
     """Several changes fitted at once to the first `look` runs.
 
-    With T_i the information of the runs from k_i on and J_i = T_i[c_i, :],
-        N_ij = T_max(i, j)[c_i, c_j] - J_i S^-1 J_j',   s_i = g_i[c_i] - J_i S^-1 g.
+    With h_i the course of a change over the runs and J_i = sum h_i I[c_i, :],
+        N_ij = sum h_i h_j I[c_i, c_j] - J_i S^-1 J_j',   s_i = sum h_i g[c_i] - J_i S^-1 g.
     """
     runs, temper = changes.compared(look), changes.temper(look)
-    later = [runs.normal[one.k :].sum(axis=0) for one in ones]
+    over = [one.course.over(look) for one in ones]
     index = [one.term.index for one in ones]
-    across = np.concatenate([t[own] for t, own in zip(later, index, strict=True)])
-    scores = np.concatenate([runs.score[one.k :].sum(axis=0)[own]
-                             for one, own in zip(ones, index, strict=True)])  # fmt: skip
-    both = [[later[i if ones[i].k >= ones[j].k else j][np.ix_(index[i], index[j])]
+    across = np.concatenate([np.tensordot(h, runs.normal[:, own], axes=1)
+                             for h, own in zip(over, index, strict=True)])  # fmt: skip
+    scores = np.concatenate([h @ runs.score[:, own] for h, own in zip(over, index, strict=True)])
+    both = [[np.tensordot(over[i] * over[j], runs.normal[:, index[i][:, None], index[j]], axes=1)
              for j in range(len(ones))] for i in range(len(ones))]  # fmt: skip
     inverse = inverted(np.block(both) - across @ runs.inverse @ across.T)
     values = inverse @ (scores - across @ (runs.inverse @ runs.score.sum(axis=0)))
     place = {term.label: k for k, term in enumerate(changes.terms)}
+    row = {course: k for k, course in enumerate(courses(look))}
     found, end = [], 0
     for one in ones:
         at = slice(end, end + one.term.size)
         end += one.term.size
-        factor = float(temper[one.k - 1, place[one.term.label]])
+        factor = float(temper[row[one.course], place[one.term.label]])
         found.append(replace(one, values=values[at], covariance=factor * inverse[at, at]))
     return found
 
 
-def _best(changes: Changes, look: int, table: Array, first: int, total: float) -> Seen:
+def _best(changes: Changes, look: int, first: int, total: float) -> Seen:
     """The likeliest change; among effects that are as good, the commonest in practice."""
+    table = changes.likelihoods(look)
     each = np.logaddexp.reduce(table, axis=0)
     close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
     c = min(close, key=lambda i: (commonness(changes.terms[i].label), -each[i]))
+    known = courses(look)
     share = np.exp(table[:, c] - each[c])
-    k = int(np.argmax(share)) + 1
+    kinds = np.array([one.kind for one in known])
+    kind = max(dict.fromkeys(kinds), key=lambda one: float(share[kinds == one].sum()))
+    row = int(np.argmax(np.where(kinds == kind, share, -1.0)))
     order = np.argsort(-share)
     needed = int(np.searchsorted(np.cumsum(share[order]), CREDIBLE)) + 1
-    credible = order[:needed] + 1
+    credible = [known[k].k for k in order[:needed]]
     others = sorted(
         ((changes.terms[i], float(each[c] - each[i])) for i in range(len(each))
          if i != c and each[i] > each[c] - RIVAL_NATS),
         key=lambda other: other[1],
     )  # fmt: skip
-    return Seen(changes.change(look, k, int(c)), int(min(credible)), int(max(credible)), first,
+    return Seen(changes.change(look, row, int(c)), min(credible), max(credible), first,
                 total, tuple(others))  # fmt: skip
 
 

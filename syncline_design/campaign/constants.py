@@ -60,7 +60,7 @@ def shown_constants(
         taken = [one.term for one in found]
         best, at, least = None, 0, SHOWN_NATS
         for terms, index in groups:
-            apart = _apart(_blocks(whole, index), _blocks(total, index))
+            apart = apart_of(_blocks(whole, index), _blocks(total, index))
             along = np.einsum("gap,ga->gp", apart.turn, score[index])
             gains = 0.5 * np.sum(along**2 * apart.another, axis=1) / inside[terms] - index.shape[1]
             gains[np.isin(terms, taken)] = 0.0
@@ -71,7 +71,7 @@ def shown_constants(
             return found
         terms, index, apart = best
         own, turn, another = index[at], apart.turn[at], apart.another[at]
-        found.append(Constant(int(terms[at]), own, _held(_blocks(whole, own), turn, another)))
+        found.append(Constant(int(terms[at]), own, held_of(_blocks(whole, own), turn, another)))
         inverse = (turn * another) @ turn.T
         across = total[:, own]
         score = score - across @ (inverse @ score[own])
@@ -82,13 +82,13 @@ def _blocks(total: Array, index: Index) -> Array:
     return np.asarray(total[index[..., :, None], index[..., None, :]])
 
 
-def _held(own: Array, turn: Array, another: Array) -> Array:
+def held_of(own: Array, turn: Array, another: Array) -> Array:
     """Prior information of the directions that are no other thing: as of what no run shows."""
     alike = own @ turn[:, another == 0.0]
     return np.asarray(alike @ alike.T / PLAUSIBLE**2)
 
 
-def _apart(own: Array, left: Array) -> Apart:
+def apart_of(own: Array, left: Array) -> Apart:
     """own, left (G, p, p): information of effects alone, and with those shown freed."""
     scale = column_sizes(np.einsum("gaa->ga", own))
     squares = scale[:, :, None] * scale[:, None, :]

@@ -168,8 +168,7 @@ def _differing(
     changes: Changes, seen: Sequence[Change], look: int, stage: Callable[[int], str]
 ) -> Iterator[str]:
     """Effects that have another value in every run: no change, and nothing to count on."""
-    for one in seen:  # what moves along with a change is told by it
-        changes = changes.without(one)
+    changes = changes.without(*seen)  # what moves along with a change is told by it
     told = {one.term.label for one in seen}
     for found in changes.differing(look):
         term = found.named

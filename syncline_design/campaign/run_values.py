@@ -64,14 +64,15 @@ def run_values(
 def _stands(pool: Pool, one: Change, stays: Index) -> bool:
     """Whether runs are likelier with a change than without it, with one value of everything.
 
-    log L(d) = sum over its runs (g_c' d - d' I_cc d / 2) + (g - w)' S^+ (g - w) / 2,
-    with g and S of all runs together and w = sum over its runs I_c d.
+    log L(d) = sum (h g_c' d - h^2 d' I_cc d / 2) + (g - w)' S^+ (g - w) / 2,
+    with h the course of the change, g and S of all runs together and w = sum h I_c d.
     """
-    own, d, after = one.term.index, one.values, stays[stays >= one.k]
-    later = pool.normal[after].sum(axis=0)
-    score, total = pool.score[stays].sum(axis=0), inverted(pool.normal[stays].sum(axis=0))
-    left = score - later[:, own] @ d
-    gained = pool.score[after][:, own].sum(axis=0) @ d - 0.5 * d @ later[np.ix_(own, own)] @ d
+    own, d, over = one.term.index, one.values, one.course.over(pool.count)[stays]
+    normal = pool.normal[stays]
+    score, total = pool.score[stays].sum(axis=0), inverted(normal.sum(axis=0))
+    left = score - np.tensordot(over, normal[:, :, own], axes=1) @ d
+    squares = np.tensordot(np.square(over), normal[:, own[:, None], own], axes=1)
+    gained = over @ pool.score[stays][:, own] @ d - 0.5 * d @ squares @ d
     return bool(gained + 0.5 * left @ total @ left > 0.5 * score @ total @ score)
 
 

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.column_sizes import column_sizes
+from syncline_design.campaign.courses import shapes
 from syncline_design.campaign.pool import Index, inverted
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -19,7 +20,7 @@ ROUNDED: Final = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class RunScatter:
-    """Of runs parted at every k from 1, and not parted, by term of a group: (look, G).
+    """Beside a change of every course, and of none, by term of a group: (2 look - 1, G).
 
     square, free: R and its free values f.  factor: their variance over that fitted as far as it is
     known, R taken as f at least, for what the noise inside runs makes is always there.
@@ -31,24 +32,39 @@ class RunScatter:
 
     @classmethod
     def of(cls, squares: Array, seen: Index, size: int) -> RunScatter:
-        """squares (look, G): R; seen (look, G): parameters that each run says anything of."""
+        """squares (2 look - 1, G): R; seen (look, G): parameters that each run says anything of."""
         before = np.cumsum(seen, axis=0)
         after = before[-1] - before
-        free = np.maximum(before - size, 0) + np.maximum(after - size, 0)
+        parted = np.maximum(before - size, 0) + np.maximum(after - size, 0)
+        drift = np.repeat(np.maximum(before[-1:] - 2 * size, 0), len(seen) - 1, axis=0)
+        free = np.concatenate([parted[:-1], drift, parted[-1:]])
         factor = (RUNS_KNOWN + np.maximum(squares, free)) / (RUNS_KNOWN + free)
         return cls(factor, squares, free)
 
 
 def scattered(normals: Array, inverses: Array, scores: Array) -> Array:
-    """Cochran's Q of runs before k and of those from k on, together, k from 1 to all, (n, G).
+    """Cochran's Q of runs beside a change of every course and of none, (2 n - 1, G): of a step what
+    runs before it and those from it on have, of a drift what is left of a line.
 
     normals, inverses (n, G, p, p) of single runs and their scores (n, G, p).
     """
     square = np.einsum("rga,rgab,rgb->g", scores, inverses, scores)
     before, moved = np.cumsum(normals, axis=0), np.cumsum(scores, axis=0)
-    found: Array = square - _explained(before, moved)
-    found[:-1] -= _explained(before[-1] - before[:-1], moved[-1] - moved[:-1])
+    explained = _explained(before, moved)
+    after = _explained(before[-1] - before[:-1], moved[-1] - moved[:-1])
+    drifts = explained[-1] + _explained(*_lines(normals, scores))
+    found: Array = square - np.concatenate([explained[:-1] + after, drifts, explained[-1:]])
     return np.maximum(found, 0.0)
+
+
+def _lines(normals: Array, scores: Array) -> tuple[Array, Array]:
+    """N (n - 1, G, p, p) and s (n - 1, G, p) of drifts beside a value that all runs have."""
+    over = shapes(len(normals))[len(normals) - 1 :]
+    mean, whole = inverted(normals.sum(axis=0)), scores.sum(axis=0)
+    later = np.tensordot(over, normals, axes=1)
+    across = later @ mean
+    own = np.tensordot(np.square(over), normals, axes=1) - across @ later
+    return own, np.tensordot(over, scores, axes=1) - np.einsum("kgab,gb->kga", across, whole)
 
 
 def freed_of(normal: Array, score: Array, index: Index, spread: Array) -> tuple[Array, Array]:

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from syncline_design.campaign.changes import REACH, Changes, weight_of
+from syncline_design.campaign.changes import REACH, Changes
+from syncline_design.campaign.courses import step_weight
 from syncline_design.campaign.pool import Term
 from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import promise_of
@@ -33,7 +34,7 @@ def sight(case: Case, changes: Changes, look: int, rate: float) -> Informative:
 def _limits(case: Case, changes: Changes, look: int, rate: float) -> Iterator[DetectionLimit]:
     names = [stage.name for stage in case.spec.stages]
     for place, (term, known) in enumerate(zip(changes.terms, changes.tells(look), strict=True)):
-        beyond = -math.log(rate * weight_of(look)) - float(changes.log_weights[place])
+        beyond = -math.log(rate * step_weight(look)) - float(changes.log_weights[place])
         yield from limits_of(term, names, _smallest(known, beyond))
     for term in changes.pool.untold:
         yield from limits_of(term, names)

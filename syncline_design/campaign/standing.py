@@ -62,7 +62,7 @@ def standing(changes: Changes, strange: Sequence[Stranger]) -> StandingAlone:
         spans = [_explaining(left, int(np.flatnonzero(rows == one.run)[0]), one) for one in still]
         span = max(spans, key=lambda one: one.gain)
         change = _changed(left)
-        as_change = change is not None and _explained(left, change) > span.gain
+        as_change = change is not None and _explained(change) > span.gain
         ends = (change.k, len(rows)) if change is not None and as_change else (span.first, span.end)
         lone = _lone(ends, len(rows))
         one = None if lone is None else next((s for s in still if s.run == rows[lone]), None)
@@ -89,18 +89,14 @@ def _lone(ends: tuple[int, int], count: int) -> int | None:
 
 
 def _changed(changes: Changes) -> Change | None:
-    """The likeliest change of one effect from one run on, whatever runs are strange in; None where
-    no change is likelier."""
-    count = changes.pool.count
-    table = changes.mixed(count)[1]
-    k, c = np.unravel_index(int(np.argmax(table)), table.shape)
-    return changes.change(count, int(k) + 1, int(c)) if table[k, c] > 0.0 else None
+    """The likeliest change of one effect from one run on, whatever runs are strange in, by the
+    noise fitted; None where no change is likelier."""
+    return changes.likeliest(changes.pool.count)
 
 
-def _explained(changes: Changes, change: Change) -> float:
+def _explained(change: Change) -> float:
     """What a change explains [nat], by the noise fitted, as spans do."""
-    normal, _ = _freed(changes, change.term.index, [(change.k, changes.pool.count)])
-    return 0.5 * float(change.values @ normal[0] @ change.values)
+    return 0.5 * float(change.values @ inverted(change.covariance) @ change.values)
 
 
 def _explaining(changes: Changes, at: int, one: Stranger) -> Span:

@@ -28,6 +28,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.changes import Changes, Runs, pseudo_inverse
+from syncline_design.campaign.constants import Apart, apart_of, held_of
 from syncline_design.campaign.pool import Index, Term, inverted
 from syncline_design.campaign.scatter import APART, freed_of
 from syncline_design.diagnosis.candidates import commonness
@@ -232,7 +233,8 @@ class Odd:
     def log_p(self, k: int, beside: Sequence[int], limit: float = 0.0) -> float:
         """log of the chance of one effect's departure beside those of others, as it is where
         nothing else differs if that is no less than the limit."""
-        temper, inside = self.doubt * float(self.temper[k]), float(self.inside[k])
+        doubt = 1.0 if beside else self.doubt  # a run that is odd is no more like the others
+        temper, inside = doubt * float(self.temper[k]), float(self.inside[k])
         first = self._chance(self.known.alike, k, beside, temper) + self.charge
         if first >= limit:
             return first
@@ -241,23 +243,42 @@ class Odd:
         return float(np.logaddexp.reduce([first + alike.log_share, *np.add(each, self.charge)]))
 
     def _chance(self, own: Own, k: int, beside: Sequence[int], temper: float) -> float:
-        index = self.changes.terms[k].index
-        free = int(np.sum(np.diag(own.normal)[index] > 0.0))
+        more, free = self._more(own, k, beside)
         if not free:
             return 0.0
-        more = self.square((*beside, k), own) - self.square(beside, own)
-        square = max(more, 0.0) / temper
+        square = more / temper
         if self.known.runs.freed:
             return log_f(square / free, free, len(self.known.runs.normal) - 1)
         return log_p_of(square, free)
 
-    def square(self, taken: Sequence[int], own: Own | None = None) -> float:
-        """u' W^-1 u of some effects."""
-        index, held = self._index(taken), own or self.known.alike
-        if not index.size:
-            return 0.0
-        score = held.score[index]
-        return float(score @ inverted(held.normal[np.ix_(index, index)]) @ score)
+    def _more(self, own: Own, k: int, beside: Sequence[int]) -> tuple[float, int]:
+        """u' W^-1 u of an effect, others of the run free beside it, and how many values that is:
+        of its directions that are another thing than they, as of constants."""
+        index, rest = self.changes.terms[k].index, self._index(beside)
+        across = own.normal[np.ix_(index, rest)] @ inverted(own.normal[np.ix_(rest, rest)])
+        apart = self._apart(own, k, beside)
+        along = (own.score[index] - across @ own.score[rest]) @ apart.turn[0]
+        return float(along**2 @ apart.another[0]), int(np.sum(apart.another[0] > 0.0))
+
+    def _apart(self, own: Own, k: int, beside: Sequence[int]) -> Apart:
+        index, rest = self.changes.terms[k].index, self._index(beside)
+        whole, across = own.normal[np.ix_(index, index)], own.normal[np.ix_(index, rest)]
+        left = whole - across @ inverted(own.normal[np.ix_(rest, rest)]) @ across.T
+        return apart_of(whole[None], left[None])
+
+    def _together(self, taken: Sequence[int]) -> tuple[Array, Array]:
+        """Values of several effects, and their covariance by the noise fitted: a direction that is
+        no other thing than what was taken before stays small, or the two would undo each other."""
+        index, own, at = self._index(taken), self.known.alike, 0
+        normal = own.normal[np.ix_(index, index)]
+        for place, k in enumerate(taken):
+            apart, term = self._apart(own, k, taken[:place]), self.changes.terms[k]
+            whole = own.normal[np.ix_(term.index, term.index)]
+            among = slice(at, at + term.size)
+            normal[among, among] += held_of(whole, apart.turn[0], apart.another[0])
+            at += term.size
+        covariance = inverted(normal)
+        return covariance @ own.score[index], covariance
 
     def _index(self, taken: Sequence[int]) -> Index:
         none = np.zeros(0, dtype=np.int64)
@@ -272,9 +293,8 @@ class Odd:
                 break
             taken.append(one)
         stay = [k for k in taken if self.log_p(k, [b for b in taken if b != k], limit) < limit]
-        index = self._index(stay)
-        covariance = inverted(self.known.alike.normal[np.ix_(index, index)])
-        values, at = covariance @ self.known.alike.score[index], 0
+        values, covariance = self._together(stay)
+        at = 0
         for k in stay:
             term = self.changes.terms[k]
             own = slice(at, at + term.size)
@@ -288,12 +308,9 @@ class Odd:
         odd = [k for k, chance in chances.items() if chance < limit]
         if not odd:
             return None
-        gains = {k: self._gain(k, taken) for k in odd}
+        more = {k: self._more(self.known.alike, k, taken)[0] for k in odd}
+        noise = float(self.inside[max(odd, key=more.__getitem__)])  # one for all: a run has one
+        gains = {k: 0.5 * more[k] / noise - self.changes.terms[k].size for k in odd}
         most = max(gains.values())
         close = [k for k in odd if gains[k] >= most - AS_GOOD_NATS]
         return min(close, key=lambda k: (commonness(self.changes.terms[k].label), chances[k]))
-
-    def _gain(self, k: int, taken: Sequence[int]) -> float:
-        """What an effect explains, less its freedom [nat]."""
-        more = self.square((*taken, k)) - self.square(taken)
-        return 0.5 * more / float(self.doubt * self.temper[k]) - self.changes.terms[k].size

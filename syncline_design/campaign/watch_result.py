@@ -90,12 +90,24 @@ class Other(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Drift(Record):
+    """A parameter that is another with every run: by how much from one to the next, in SI; by_run:
+    the last run, by which it came to the whole change."""
+
+    per_run: float
+    standard_uncertainty: float
+    text: str
+    by_run: int
+
+
+@dataclass(frozen=True, slots=True)
 class Alarm(Record):
     """One parameter that changed: by how much, in SI, and since when.
 
     words: a convention that is another, which has no figure; then `change` is null.  text: the
     change as outputs print it.  first_run: at which run the alarm was first due.  alone: true where
-    the runs before and after `since` are alike, and differ from that one run.
+    the runs before and after `since` are alike, and differ from that one run.  drift: where it is
+    another with every run, of which `since` is the first; change is what it came to by the last.
     """
 
     effect: str
@@ -114,6 +126,7 @@ class Alarm(Record):
     aliases: tuple[Other, ...]
     words: str | None = optional()
     alone: bool | None = optional()
+    drift: Drift | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.changes import Change
 from syncline_design.campaign.compared_runs import ComparedRuns, Seen
+from syncline_design.campaign.courses import Course
 from syncline_design.campaign.joint import JointError
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.oddities import cautions
@@ -40,6 +41,7 @@ from syncline_design.campaign.strangers import Stranger, strangers
 from syncline_design.campaign.telling import estimates
 from syncline_design.campaign.watch_result import (
     Alarm,
+    Drift,
     Other,
     RunValue,
     Since,
@@ -281,7 +283,7 @@ class Watching:
         evidence = float(self.every.evidence[first - 2])
         for one in (s for s in self.strange if s.run in self.alone):
             for departure in one.departures:
-                change = Change(departure.term, one.run, departure.judged.values,
+                change = Change(departure.term, Course("step", one.run), departure.judged.values,
                                 departure.judged.model, evidence)  # fmt: skip
                 seen = Seen(change, one.run, one.run, first, evidence, ())
                 found = self._alarms(seen, self.every)
@@ -291,8 +293,10 @@ class Watching:
         return self.case.spec.stages[index].name
 
     def _alarms(self, one: Seen, course: ComparedRuns | None = None) -> Iterator[Alarm]:
-        """An alarm for each parameter of an effect that clearly changed; at least the clearest."""
+        """An alarm for each parameter of an effect that clearly changed; at least the clearest.  Of
+        a drift, the change is what it came to by the last run."""
         runs = (course or self.rest).runs
+        grown = float(one.change.course.over(len(runs))[-1])
         change, term = one.change, one.change.term
         slopes = term.effect.slopes()
         spread = np.sqrt(np.maximum(np.diag(change.covariance), 0.0))
@@ -301,7 +305,8 @@ class Watching:
         for k in np.argsort(-size):
             if size[k] < SHOWN and k != np.argmax(size):
                 continue
-            value, sigma = float(change.values[k]), float(spread[k])
+            each, own = float(change.values[k]), float(spread[k])
+            value, sigma, unit = grown * each, grown * own, slopes[k].unit
             half = NORMAL_95 * sigma
             e_value = math.exp(min(one.log_evidence, 690.0))
             alarm_from = f"alarm from {to_digits(1.0 / self.request.rate, 3)} on"
@@ -313,14 +318,16 @@ class Watching:
                 change=value,
                 standard_uncertainty=sigma,
                 interval95=(value - half, value + half),
-                unit=slopes[k].unit,
-                text=estimate(value, sigma, slopes[k].unit).text,
+                unit=unit,
+                text=estimate(value, sigma, unit).text,
                 since=_since(runs, change.k, one.low, one.high),
                 evidence=f"e-value {e_value_text(e_value)}, {alarm_from}",
                 e_value=e_value,
                 first_run=runs[one.first_look - 1].number,
                 aliases=others,
-            )
+                drift=Drift(each, own, estimate(each, own, unit).text, runs[-1].number)
+                if change.course.kind == "drift" else None,
+            )  # fmt: skip
 
     def _conventions(self) -> Iterator[Alarm]:
         """Conventions and slips that were undone in some runs and not in the first."""
@@ -341,8 +348,7 @@ class Watching:
         """Every run of every baseline, with what it tells alone beside what is named."""
         place = {e.number: k for k, e in enumerate(self.ordered)}
         looks = {e.number: k for k, e in enumerate(self.rest.runs)}
-        seen = [replace(one.change, k=place[self.rest.runs[one.change.k].number])
-                for one in self.rest.seen]  # fmt: skip
+        seen = [self._among_all(one.change, place) for one in self.rest.seen]
         values = run_values(self.every.changes, seen, RATE, self.alone)
         for entry in self.stored.entries:
             k, look = place.get(entry.number), looks.get(entry.number)
@@ -362,6 +368,11 @@ class Watching:
                 left_out=True if entry.number in self.stored.left_out else None,
                 checks=entry.run.checks or None,
             )
+
+    def _among_all(self, change: Change, place: Mapping[int, int]) -> Change:
+        """A change that the rest of the runs show, by its place among all."""
+        at = place[self.rest.runs[change.k].number]
+        return replace(change, course=replace(change.course, k=at))
 
     def _told(self, one: RunParameter) -> RunValue:
         term, half = one.term, None if one.spread is None else NORMAL_95 * one.spread

@@ -102,7 +102,8 @@ def _outcome(found: Watch) -> Outcome:
         words = f"Run {first.since.run} {also}is unlike the others: {names}{more}"
         return Outcome("bad", "!", words)
     when = first.since.date or f"run {first.since.run}"
-    return Outcome("bad", "!", f"Changed: {_name(first)}, since {when}")
+    what = "Changed" if first.drift is None else "Drifts"
+    return Outcome("bad", "!", f"{what}: {_name(first)}, since {when}")
 
 
 def _odd_one(found: Watch) -> str:
@@ -189,6 +190,9 @@ def _sentence(one: Alarm) -> str:
         first, last = one.since.low_date, one.since.high_date
         ends = f"{first} to {last}" if first and last else f"{one.since.low} to {one.since.high}"
         near = f", with 95 % one of the runs {ends}"
+    if one.drift is not None:
+        each, by = f"{one.drift.text} a run", f"{one.text} by run {one.drift.by_run}"
+        return f"{name}: {_parameter(one)} drifts by {each} since {place}{near}: {by}."
     return f"{name}: {_parameter(one)} changed by {one.text} with {place}{near}."
 
 
@@ -240,6 +244,9 @@ def _alarms(found: Watch) -> list[Node]:
 def _alarm(one: Alarm) -> Node:
     what = "Departure" if one.alone else "Change"
     facts: list[tuple[str, str]] = [(f"{what} of {_parameter(one)}", one.text)]
+    if one.drift is not None:
+        facts[0] = (f"Drift of {_parameter(one)}", f"{one.drift.text} a run")
+        facts.append((f"By run {one.drift.by_run}", one.text))
     if one.interval95 is not None and one.change is not None:
         told = format_interval(
             one.change, one.standard_uncertainty or 0.0, one.interval95, one.unit

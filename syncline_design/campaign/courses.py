@@ -1,0 +1,66 @@
+"""How an effect is another from one run on: at once, or by as much more with every run.
+
+A change from run k on has the course h over the runs, 0 before k: of a step 1, of a drift the
+number of runs since, the first counted.  Weights of all courses sum to one: half as many changes
+are looked for at the run EARLY as at the first, and DRIFTING of them all are drifts.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Literal
+
+import numpy as np
+
+from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
+
+Kind = Literal["step", "drift"]
+EARLY: Final = 10.0  # runs after which a change is met half as often as at the first
+DRIFTING: Final = 0.1  # share of the changes that grow from run to run
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """A change from one run on; k: place of the first run that has it."""
+
+    kind: Kind
+    k: int
+
+    def over(self, count: int) -> Array:
+        """h of so many runs, (count,)."""
+        since = np.maximum(np.arange(count) - self.k + 1.0, 0.0)
+        found: Array = np.minimum(since, 1.0) if self.kind == "step" else since
+        return found
+
+
+def courses(look: int) -> tuple[Course, ...]:
+    """All that so many runs could show: steps from every run from the second on, then drifts."""
+    kinds: tuple[Kind, ...] = ("step", "drift")
+    return tuple(Course(kind, k) for kind in kinds for k in range(1, look))
+
+
+def shapes(look: int) -> Array:
+    """Their h, (2 (look - 1), look)."""
+    return np.array([one.over(look) for one in courses(look)]).reshape(-1, look)
+
+
+def log_weights(look: int) -> Array:
+    """log of their shares of the false alarms, (2 (look - 1),)."""
+    shares = {"step": 1.0 - DRIFTING, "drift": DRIFTING}
+    return np.log([shares[one.kind] * weight_of(one.k + 1) for one in courses(look)])
+
+
+def step_weight(k: int) -> float:
+    """Share of the false alarms that a step at the run k (from 2) may have."""
+    return (1.0 - DRIFTING) * weight_of(k)
+
+
+def weight_of(k: int) -> float:
+    """Share of the false alarms that a change at the run k (from 2) may have."""
+    return later(k) - later(k + 1)
+
+
+def later(k: int) -> float:
+    """Share of the changes at the run k (from 2) or later: what was mounted last moves first."""
+    return math.sqrt((EARLY + 2.0) / (EARLY + k))
