@@ -22,7 +22,9 @@ from syncline_design.campaign.strangers import strangers
 from syncline_design.campaign.watch_result import e_value_text
 from syncline_design.diagnosis.result import Check
 from syncline_design.diagnosis.settings import DiagnosisSettings
+from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.diagnosis.system import pinned_system
+from syncline_design.effects import registry
 from syncline_design.spec.load import load
 from tests.watched_series import BOUND, LABELS, car_spec, kept, run_of, statistics, told, watch
 from tests.world import make_log, scenario
@@ -172,6 +174,63 @@ def test_runs_of_a_change_that_show_it_by_other_names_are_no_strangers(size: flo
             found = standing(changes, strangers(changes))
             assert found.alone == ()
             assert not found.strange
+
+
+def test_a_run_that_stands_alone_is_told_by_all_that_it_has() -> None:
+    """Latency by 80 bounds and the datum's north by -50, columns of cosine 0.9, in run 6 of 7: each
+    is told beside the other, for alone the first would take most of what the second is."""
+    moved = np.array([80.0, 0, -50.0, 0, 0]) * BOUND
+    true = {"latency_s": moved[0], "north_m": moved[2]}
+    off = []
+    for seed in range(15):
+        rng = np.random.default_rng([19, seed])
+        runs = [statistics(rng, moved * (k == 5), 0.9) for k in range(7)]
+        (one,) = strangers(Changes(pool_of(runs, range(7))))
+        assert one.run == 5
+        assert {d.term.label[0] for d in one.departures} == {"latency", "datum_offset"}
+        for d in one.departures:
+            names = [p.name for p in d.term.effect.slopes()]
+            off += list((d.judged.values - [true.get(n, 0.0) for n in names]) / d.judged.spread)
+    assert max(map(abs, off)) < 4.5
+    assert 0.6 < float(np.std(off)) < 1.3
+
+
+def test_effects_are_told_by_one_noise_of_a_run() -> None:
+    """Parts of runs that scatter more about the latency than about the datum make the datum no
+    likelier, in a run that stands alone or from a run on: the one that explains the runs is."""
+    moved = np.array([40.0, 0, 0, 0, 0]) * BOUND
+    for seed in range(6):
+        rng = np.random.default_rng([20, seed])
+        runs = [statistics(rng, moved * (k == 5), 0.97) for k in range(7)]
+        changes = Changes(pool_of(runs, range(7)))
+        latency = [t.label[0] for t in changes.terms].index("latency")
+        changes.__dict__["within"] = np.ones((7, len(changes.terms)))
+        changes.within[:, latency] = 3.0
+        (one,) = strangers(changes)
+        assert [d.term.label[0] for d in one.departures] == ["latency"]
+        row, c = np.unravel_index(int(np.argmax(changes.likelihoods(6))), (10, len(changes.terms)))
+        assert (changes.terms[int(c)].label[0], row) == ("latency", 4)
+
+
+def test_no_two_effects_of_a_run_undo_each_other() -> None:
+    """A latency of 300 bounds, and packets whose slope in that run differs from the latency's by
+    one in a hundred, where another day's log is not quite linear: the two would be huge, of either
+    sign.  One of them is told, by what it is."""
+    rare = registry()["packetised_timestamps"].slopes()[0].name
+    labels = (LABELS[0], ("packetised_timestamps", "position", 0, rare))
+    rng = np.random.default_rng(21)
+    runs = []
+    for k in range(9):
+        columns = np.repeat(rng.standard_normal((64, 1)) / 1e-3, 2, axis=1)
+        columns[:, 1] *= 1.0 + 1e-2 * rng.standard_normal(64)
+        curved = 0.25 * (columns[:, 1] - columns[:, 0])  # of second order: 250 ms of either sign
+        y = columns[:, 0] * 300.0 * BOUND[0] * (k == 4) + curved * (k == 4)
+        y = y + rng.standard_normal(64)
+        normal = columns.T @ columns
+        runs.append(Sufficient(labels, normal, columns.T @ y, float(y @ y), normal / 64.0, ()))
+    (one,) = strangers(Changes(pool_of(runs, range(9))))
+    (departure,) = one.departures
+    assert departure.judged.values[0] == pytest.approx(300.0 * BOUND[0], rel=0.02)
 
 
 def test_several_changes_of_one_day_are_told_once_each_with_their_uncertainty(

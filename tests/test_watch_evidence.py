@@ -12,9 +12,9 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from syncline_design.campaign.changes import DRIFT, REACH, Changes
-from syncline_design.campaign.courses import Course, courses, log_weights, weight_of
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.scatter import APART, DIFFERING, log_odds_apart
+from syncline_design.campaign.trends import Trend, log_weights, trends, weight_of
 from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.effects import registry
 from watched_series import (
@@ -145,7 +145,7 @@ def test_the_evidence_of_a_large_change_does_not_end() -> None:
     course = [changes.log_evidence(n)[0] for n in range(11, 25)]
     assert all(later > before > 0.0 for before, later in itertools.pairwise(course))
     place = [term.effect.name for term in changes.terms].index("latency")
-    step = courses(24).index(Course("step", 10))
+    step = trends(24).index(Trend("step", 10))
     assert changes.change(24, step, place).log_factor > 1000.0
 
 

@@ -1,9 +1,11 @@
 """Whether an effect of a system changed from one run to a later one, however often it is asked.
 
-Until a change every parameter b is one value in all runs; from run k on one effect c has b_c + d.
-With S_n the sum of all information and of the prior of b, T the information of the runs from k on,
-    N = I_T[c, c] - I_T[c, :] S_n^-1 I_T[:, c],   s = g_T[c] - I_T[c, :] S_n^-1 g,
-and with d ~ N(0, D), D of REACH bounds of one run, the Bayes factor for the change is
+Until a change every parameter b is one value in all runs; from run k on one effect c has b_c + h d,
+of a step with h = 1, of a drift with h = 1, 2, 3, ... (`trends`).  With S_n the sum of all
+information and of the prior of b, and with J = sum h I[c, :],
+    N = sum h^2 I[c, c] - J S_n^-1 J',   s = sum h g[c] - J S_n^-1 g,
+and with d ~ N(0, D), D of REACH bounds of one run (of a drift of DRIFT from run to run), the Bayes
+factor for the change is
     B_ck = |1 + N D|^-1/2 exp(s' (N + D^-1)^-1 s / 2).
 What the build has all along is no alarm: effects that all runs together show as constants may have
 any value that they can have.  Those that they do not show are small: 0 to within PLAUSIBLE of their
@@ -13,10 +15,10 @@ not show would do for any change.
 An effect that differs from run to run while nothing is moved would pass for a change of it, or of a
 commoner one that moves the runs alike.  So the runs are held against that, too: L_a is how much
 likelier they are where effect a has a value of its own in every run, normal about the common one,
-and p_a the odds of it.  What clearly differs (Q of its runs, parted at any k) is freed in each run
-to the extent that it does, for all others too.
-Mixed over effects with weights w_c (the common ones have more) and over k with weights w_k, each of
-sum one (changes that did not happen yet count one),
+and p_a the odds of it.  What clearly differs (Q of its runs, beside any trend of it and the likeliest
+change of all) is freed in each run to the extent that it does, for all others too.
+Mixed over effects with weights w_c (the common ones have more) and over trends from any k with
+weights w_k, each of sum one (changes that did not happen yet count one),
     E_n = sum w_k w_c B_ck / (1 + sum p_a L_a)
 is an e-process: with one value of every effect, or with values that differ as the mixture has it,
 it reaches 1 / alpha at any look, of however many, with a chance of at most alpha (Ville's
@@ -38,9 +40,10 @@ import numpy as np
 
 from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
-from syncline_design.campaign.courses import Course, courses, later, log_weights, shapes
+from syncline_design.campaign.differing import clearly_differing
 from syncline_design.campaign.looks import KeptLook
-from syncline_design.campaign.pool import Index, Pool, Term, inverted
+from syncline_design.campaign.pool import Pool, Term, inverted
+from syncline_design.campaign.run_records import Change, Differing, Freed, Group, Runs
 from syncline_design.campaign.scatter import (
     APART,
     RunScatter,
@@ -50,93 +53,15 @@ from syncline_design.campaign.scatter import (
     log_odds_apart,
     scattered,
 )
+from syncline_design.campaign.trends import Trend, later, log_weights, shapes, trends
+from syncline_design.campaign.within_runs import scatter_within
 from syncline_design.diagnosis.candidates import commonness
-from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
 DRIFT: Final = 1.0  # bounds of one run: the change from run to run of the drift that is looked for
-SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
-AS_CLEAR: Final = 2.0  # standard deviations of Q by which effects differ as clearly
 MOST_SCATTERED: Final = 2
-
-
-@dataclass(frozen=True, eq=False)
-class Change:
-    """One effect from one run on: d (of a drift by run) with its covariance, and log of the Bayes
-    factor."""
-
-    term: Term
-    course: Course
-    values: Array
-    covariance: Array
-    log_factor: float
-
-    @property
-    def k(self) -> int:
-        """Place of the first run that has it."""
-        return self.course.k
-
-    def is_of(self, other: Change) -> bool:
-        """Whether both are of one effect and of one course."""
-        return (self.term.label, self.course) == (other.term.label, other.course)
-
-
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Terms of one size: where they stand among all, and their parameters (G, p)."""
-
-    terms: Index
-    index: Index
-
-    @property
-    def blocks(self) -> tuple[Index, Index]:
-        """Index of their own blocks in matrices (..., P, P)."""
-        return self.index[:, :, None], self.index[:, None, :]
-
-
-@dataclass(frozen=True, eq=False)
-class Differing:
-    """An effect that differs from run to run, and the covariance (p, p) by which it does beyond
-    noise; named, named_covariance: the same of the commonest that differs as clearly.  log_p: log
-    of the chance that the named one differs so much by noise alone, all effects counted."""
-
-    term: Term
-    covariance: Array
-    named: Term
-    named_covariance: Array
-    log_p: float
-
-    @property
-    def spread(self) -> Array:
-        """Standard deviation of the named effect by parameter, (p,)."""
-        found: Array = np.sqrt(np.maximum(np.diag(self.named_covariance), 0.0))
-        return found
-
-
-@dataclass(frozen=True, slots=True)
-class Freed:
-    """N (2 (look - 1), G, p, p) and s (2 (look - 1), G, p) of every course, by group of terms."""
-
-    normals: tuple[Array, ...]
-    scores: tuple[Array, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Runs:
-    """Information and score of runs, their sum with the prior and its inverse, and the scatter of
-    each effect.
-
-    freed: what clearly differs from run to run.
-    """
-
-    normal: Array
-    score: Array
-    total: Array
-    inverse: Array
-    scatters: tuple[RunScatter, ...]
-    freed: tuple[Differing, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,22 +106,11 @@ class Changes:
         return np.array([*known, *rest]).reshape(self.pool.count, len(self.terms))
 
     def within_of(self, run: int) -> Array:
-        """The same of one run, (C,).
-
-        Of each effect alone, the others where the run itself puts them: what acts all along would
-        else be taken for scatter.
-        """
-        less = self.pool.less[run]
-        if not less:
+        """The same of one run, (C,)."""
+        if not self.pool.less[run]:
             return np.ones(len(self.terms))
-        whole = self.pool.normal[run]
-        values = pseudo_inverse(whole + np.diag(self.prior)) @ self.pool.score[run]
-        found = np.zeros((len(less), len(self.terms)))
-        for k, part in enumerate(less):
-            left = part.score - part.normal @ values
-            for group in self.groups:
-                found[k, group.terms] = _scatter(whole, part.normal, left, group)
-        return np.asarray(np.max(found, axis=0))
+        known = pseudo_inverse(self.pool.normal[run] + np.diag(self.prior))
+        return scatter_within(self.pool, run, self.groups, known)
 
     @cached_property
     def log_weights(self) -> Array:
@@ -298,13 +212,13 @@ class Changes:
         )
         inverse = inverted(freed.normals[group][row, at])
         values = inverse @ freed.scores[group][row, at]
-        return Change(self.terms[c], courses(look)[row], values, inverse, 0.0)
+        return Change(self.terms[c], trends(look)[row], values, inverse, 0.0)
 
     def tells(self, look: int) -> list[Array]:
         """Of every effect the information (p, p) that `look` runs have about a step with the
         last of them, by the scatter of runs and of their parts."""
         found: list[Array] = [np.zeros((term.size, term.size)) for term in self.terms]
-        last = courses(look).index(Course("step", look - 1))
+        last = trends(look).index(Trend("step", look - 1))
         factor = self.temper(look)[last]
         for group, normal in zip(self.groups, self._freed(look).normals, strict=True):
             for place, own in zip(group.terms, normal[last], strict=True):
@@ -377,7 +291,7 @@ class Changes:
             if likely is not None:
                 found = self._compared(look, found.normal, found.score, likely)
             for _ in range(MOST_SCATTERED):
-                one = self._scattering(found)
+                one = clearly_differing(self.terms, self.groups, found)
                 if one is None:
                     break
                 freed = (*found.freed, one)
@@ -405,7 +319,7 @@ class Changes:
         if not self.beside:
             return normal, score
         index = np.concatenate([np.arange(score.shape[1]), *(b.term.index for b in self.beside)])
-        over = [np.repeat(b.course.over(look)[:, None], b.term.size, axis=1) for b in self.beside]
+        over = [np.repeat(b.trend.over(look)[:, None], b.term.size, axis=1) for b in self.beside]
         grown: Array = np.concatenate([np.ones_like(score), *over], axis=1)
         squares = grown[:, :, None] * grown[:, None, :]
         return normal[:, index[:, None], index] * squares, score[:, index] * grown
@@ -424,7 +338,7 @@ class Changes:
         left = score
         if likely is not None:
             made = normal[:, :, likely.term.index] @ likely.values
-            left = score - likely.course.over(look)[:, None] * made
+            left = score - likely.trend.over(look)[:, None] * made
         left = left - normal @ (inverse @ left.sum(axis=0))
         found = []
         for g in self.groups:
@@ -435,32 +349,6 @@ class Changes:
                 RunScatter.of(squares / self.inside(look)[g.terms], seen, g.index.shape[1])
             )
         return Runs(normal, score, total, inverse, tuple(found))
-
-    def _scattering(self, runs: Runs) -> Differing | None:
-        """The effect that differs most clearly from run to run; None where noise would do.  One
-        change of it is none, of any course."""
-        if not self.terms:
-            return None
-        clear, excess, chance = (np.zeros(len(self.terms)) for _ in range(3))
-        for g, scatter in zip(self.groups, runs.scatters, strict=True):
-            least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
-            clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
-            excess[g.terms] = least / np.where(free > 0.0, free, np.inf) - 1.0
-            pairs = zip(least, free, strict=True)
-            chance[g.terms] = [log_p_of(float(q), int(f)) if f > 0.0 else 0.0 for q, f in pairs]
-        best = int(np.argmax(clear))
-        if not clear[best] > SCATTERED:
-            return None
-        alike = np.flatnonzero(clear > clear[best] - AS_CLEAR)
-        named = min(alike, key=lambda k: commonness(self.terms[k].label))
-        usual = runs.normal.mean(axis=0)
-        return Differing(
-            self.terms[best],
-            excess[best] * _own_covariance(usual, self.terms[best]),
-            self.terms[named],
-            excess[named] * _own_covariance(usual, self.terms[named]),
-            float(chance[named]) + math.log(len(self.terms)),
-        )
 
     def total(self, look: int, normal: Array, score: Array) -> Array:
         """Information of runs, with the prior of what they show; what is beside is free."""
@@ -479,7 +367,7 @@ class Changes:
         score = self.pool.score.copy()
         for one in ones:
             made = self.pool.normal[:, :, one.term.index] @ one.values
-            score -= one.course.over(self.pool.count)[:, None] * made
+            score -= one.trend.over(self.pool.count)[:, None] * made
         return self._of(replace(self.pool, score=score), self.beside)
 
     def taking(self, one: Change) -> Changes:
@@ -505,27 +393,9 @@ def _marginal(total: Array, score: Array, size: int) -> tuple[Array, Array]:
     return total[:size, :size] - across @ total[size:, :size], left
 
 
-def _own_covariance(normal: Array, term: Term) -> Array:
-    """Covariance (p, p) of one effect alone, by an information matrix."""
-    return inverted(normal[np.ix_(term.index, term.index)])
-
-
 def pseudo_inverse(total: Array) -> Array:
     """total^-1 (..., P, P), columns scaled alike first."""
     scale = column_sizes(np.diagonal(total, axis1=-2, axis2=-1))
     squares = scale[..., :, None] * scale[..., None, :]
     found: Array = np.linalg.pinv(total / squares, hermitian=True, rcond=1e-13) / squares
     return found
-
-
-def _scatter(whole: Array, normals: Array, scores: Array, group: Group) -> Array:
-    """Mean over an effect's parameters of the jackknife's variance over the fitted one, (G,).
-
-    normals (n, P, P), scores (n, P): of a run without each of its parts.
-    """
-    own = whole[group.blocks]
-    values = np.einsum("ngab,ngb->nga", inverted(normals[:, *group.blocks]), scores[:, group.index])
-    off = values - values.mean(axis=0)
-    seen = np.sum(np.einsum("gaa->ga", own) > 0.0, axis=-1)
-    spread = (1.0 - 1.0 / len(values)) * np.einsum("nga,gab,ngb->g", off, own, off)
-    return np.asarray(np.where(seen > 0, spread / np.maximum(seen, 1), 1.0))

@@ -10,11 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Change, Changes
-from syncline_design.campaign.courses import courses
+from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.looks import KeptLook, keys_of, known_first
 from syncline_design.campaign.pool import Pool, Term, inverted, pool_of
+from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.store import Entry, Stored, by_date
+from syncline_design.campaign.trends import trends
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -184,7 +185,7 @@ def _fitted_together(changes: Changes, ones: Sequence[Change], look: int) -> lis
         N_ij = sum h_i h_j I[c_i, c_j] - J_i S^-1 J_j',   s_i = sum h_i g[c_i] - J_i S^-1 g.
     """
     runs, temper = changes.compared(look), changes.temper(look)
-    over = [one.course.over(look) for one in ones]
+    over = [one.trend.over(look) for one in ones]
     index = [one.term.index for one in ones]
     across = np.concatenate([np.tensordot(h, runs.normal[:, own], axes=1)
                              for h, own in zip(over, index, strict=True)])  # fmt: skip
@@ -194,12 +195,12 @@ def _fitted_together(changes: Changes, ones: Sequence[Change], look: int) -> lis
     inverse = inverted(np.block(both) - across @ runs.inverse @ across.T)
     values = inverse @ (scores - across @ (runs.inverse @ runs.score.sum(axis=0)))
     place = {term.label: k for k, term in enumerate(changes.terms)}
-    row = {course: k for k, course in enumerate(courses(look))}
+    row = {trend: k for k, trend in enumerate(trends(look))}
     found, end = [], 0
     for one in ones:
         at = slice(end, end + one.term.size)
         end += one.term.size
-        factor = float(temper[row[one.course], place[one.term.label]])
+        factor = float(temper[row[one.trend], place[one.term.label]])
         found.append(replace(one, values=values[at], covariance=factor * inverse[at, at]))
     return found
 
@@ -210,7 +211,7 @@ def _best(changes: Changes, look: int, first: int, total: float) -> Seen:
     each = np.logaddexp.reduce(table, axis=0)
     close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
     c = min(close, key=lambda i: (commonness(changes.terms[i].label), -each[i]))
-    known = courses(look)
+    known = trends(look)
     share = np.exp(table[:, c] - each[c])
     kinds = np.array([one.kind for one in known])
     kind = max(dict.fromkeys(kinds), key=lambda one: float(share[kinds == one].sum()))

@@ -8,7 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Change, Changes
+from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.store import Entry
 from syncline_design.campaign.strangers import share_of
 from syncline_design.diagnosis.finding import texts_of

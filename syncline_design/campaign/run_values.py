@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Change, Changes
+from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.naming import Naming
 from syncline_design.campaign.pool import Fitted, Index, Pool, Term, fitted, inverted
+from syncline_design.campaign.run_records import Change
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -67,7 +68,7 @@ def _stands(pool: Pool, one: Change, stays: Index) -> bool:
     log L(d) = sum (h g_c' d - h^2 d' I_cc d / 2) + (g - w)' S^+ (g - w) / 2,
     with h the course of the change, g and S of all runs together and w = sum h I_c d.
     """
-    own, d, over = one.term.index, one.values, one.course.over(pool.count)[stays]
+    own, d, over = one.term.index, one.values, one.trend.over(pool.count)[stays]
     normal = pool.normal[stays]
     score, total = pool.score[stays].sum(axis=0), inverted(normal.sum(axis=0))
     left = score - np.tensordot(over, normal[:, :, own], axes=1) @ d

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.column_sizes import column_sizes
-from syncline_design.campaign.courses import shapes
 from syncline_design.campaign.pool import Index, inverted
+from syncline_design.campaign.trends import shapes
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 

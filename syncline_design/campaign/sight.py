@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from syncline_design.campaign.changes import REACH, Changes
-from syncline_design.campaign.courses import step_weight
 from syncline_design.campaign.pool import Term
+from syncline_design.campaign.trends import step_weight
 from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.result import Informative

@@ -21,8 +21,9 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Change, Changes, pseudo_inverse
+from syncline_design.campaign.changes import Changes, pseudo_inverse
 from syncline_design.campaign.pool import Index, inverted
+from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.strangers import Departure, Stranger, departures_of, limit_of, part_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass

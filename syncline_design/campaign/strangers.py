@@ -27,9 +27,10 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Changes, Runs, pseudo_inverse
+from syncline_design.campaign.changes import Changes, pseudo_inverse
 from syncline_design.campaign.constants import Apart, apart_of, held_of
 from syncline_design.campaign.pool import Index, Term, inverted
+from syncline_design.campaign.run_records import Runs
 from syncline_design.campaign.scatter import APART, freed_of
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.judged import Judged, log_f

@@ -13,12 +13,11 @@ import numpy as np
 
 from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
-from syncline_design.campaign.changes import Change
 from syncline_design.campaign.compared_runs import ComparedRuns, Seen
-from syncline_design.campaign.courses import Course
 from syncline_design.campaign.joint import JointError
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.oddities import cautions
+from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.run_values import RunParameter, run_values
 from syncline_design.campaign.sight import sight
 from syncline_design.campaign.standing import StandingAlone, standing
@@ -39,6 +38,7 @@ from syncline_design.campaign.store import (
 from syncline_design.campaign.strangers import RATE as STRANGER_RATE
 from syncline_design.campaign.strangers import Stranger, strangers
 from syncline_design.campaign.telling import estimates
+from syncline_design.campaign.trends import Trend
 from syncline_design.campaign.watch_result import (
     Alarm,
     Drift,
@@ -283,7 +283,7 @@ class Watching:
         evidence = float(self.every.evidence[first - 2])
         for one in (s for s in self.strange if s.run in self.alone):
             for departure in one.departures:
-                change = Change(departure.term, Course("step", one.run), departure.judged.values,
+                change = Change(departure.term, Trend("step", one.run), departure.judged.values,
                                 departure.judged.model, evidence)  # fmt: skip
                 seen = Seen(change, one.run, one.run, first, evidence, ())
                 found = self._alarms(seen, self.every)
@@ -296,7 +296,7 @@ class Watching:
         """An alarm for each parameter of an effect that clearly changed; at least the clearest.  Of
         a drift, the change is what it came to by the last run."""
         runs = (course or self.rest).runs
-        grown = float(one.change.course.over(len(runs))[-1])
+        grown = float(one.change.trend.over(len(runs))[-1])
         change, term = one.change, one.change.term
         slopes = term.effect.slopes()
         spread = np.sqrt(np.maximum(np.diag(change.covariance), 0.0))
@@ -326,7 +326,7 @@ class Watching:
                 first_run=runs[one.first_look - 1].number,
                 aliases=others,
                 drift=Drift(each, own, estimate(each, own, unit).text, runs[-1].number)
-                if change.course.kind == "drift" else None,
+                if change.trend.kind == "drift" else None,
             )  # fmt: skip
 
     def _conventions(self) -> Iterator[Alarm]:
@@ -372,7 +372,7 @@ class Watching:
     def _among_all(self, change: Change, place: Mapping[int, int]) -> Change:
         """A change that the rest of the runs show, by its place among all."""
         at = place[self.rest.runs[change.k].number]
-        return replace(change, course=replace(change.course, k=at))
+        return replace(change, trend=replace(change.trend, k=at))
 
     def _told(self, one: RunParameter) -> RunValue:
         term, half = one.term, None if one.spread is None else NORMAL_95 * one.spread

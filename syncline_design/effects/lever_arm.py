@@ -50,7 +50,7 @@ EFFECT = Effect(
     sentence="the lever arm is off by {x_m} forward, {y_m} right, {z_m} down",
     confused_with="a datum offset at fixed heading; the other sensor's lever arm, up to sign "
     "and the rate term",
-    separated_by="turn and tilt",
+    separated_by="turn and tilt; from the other lever arm measure one of them on the vehicle",
     source="paper, eq. meas_gnss_frames and analytic_direct_georef",
     depart=_depart,
     sensitivity=_sensitivity,

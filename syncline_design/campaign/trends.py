@@ -21,7 +21,7 @@ DRIFTING: Final = 0.1  # share of the changes that grow from run to run
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class Trend:
     """A change from one run on; k: place of the first run that has it."""
 
     kind: Kind
@@ -34,21 +34,21 @@ class Course:
         return found
 
 
-def courses(look: int) -> tuple[Course, ...]:
+def trends(look: int) -> tuple[Trend, ...]:
     """All that so many runs could show: steps from every run from the second on, then drifts."""
     kinds: tuple[Kind, ...] = ("step", "drift")
-    return tuple(Course(kind, k) for kind in kinds for k in range(1, look))
+    return tuple(Trend(kind, k) for kind in kinds for k in range(1, look))
 
 
 def shapes(look: int) -> Array:
     """Their h, (2 (look - 1), look)."""
-    return np.array([one.over(look) for one in courses(look)]).reshape(-1, look)
+    return np.array([one.over(look) for one in trends(look)]).reshape(-1, look)
 
 
 def log_weights(look: int) -> Array:
     """log of their shares of the false alarms, (2 (look - 1),)."""
     shares = {"step": 1.0 - DRIFTING, "drift": DRIFTING}
-    return np.log([shares[one.kind] * weight_of(one.k + 1) for one in courses(look)])
+    return np.log([shares[one.kind] * weight_of(one.k + 1) for one in trends(look)])
 
 
 def step_weight(k: int) -> float:

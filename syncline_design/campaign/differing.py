@@ -1,0 +1,52 @@
+"""Which effect differs from run to run beyond noise and beyond any one change (`changes`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.pool import Term, inverted
+from syncline_design.campaign.run_records import Differing, Group, Runs
+from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.scores import log_p_of
+from syncline_design.effects.record import Array
+
+SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
+AS_CLEAR: Final = 2.0  # standard deviations of Q by which effects differ as clearly
+
+
+def _own_covariance(normal: Array, term: Term) -> Array:
+    """Covariance (p, p) of one effect alone, by an information matrix."""
+    return inverted(normal[np.ix_(term.index, term.index)])
+
+
+def clearly_differing(
+    terms: Sequence[Term], groups: Sequence[Group], runs: Runs
+) -> Differing | None:
+    """The effect that differs most clearly from run to run; None where noise would do.  One change
+    of it is none, of any course."""
+    if not terms:
+        return None
+    clear, excess, chance = (np.zeros(len(terms)) for _ in range(3))
+    for g, scatter in zip(groups, runs.scatters, strict=True):
+        least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
+        clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
+        excess[g.terms] = least / np.where(free > 0.0, free, np.inf) - 1.0
+        pairs = zip(least, free, strict=True)
+        chance[g.terms] = [log_p_of(float(q), int(f)) if f > 0.0 else 0.0 for q, f in pairs]
+    best = int(np.argmax(clear))
+    if not clear[best] > SCATTERED:
+        return None
+    alike = np.flatnonzero(clear > clear[best] - AS_CLEAR)
+    named = min(map(int, alike), key=lambda k: commonness(terms[k].label))
+    usual = runs.normal.mean(axis=0)
+    return Differing(
+        terms[best],
+        excess[best] * _own_covariance(usual, terms[best]),
+        terms[named],
+        excess[named] * _own_covariance(usual, terms[named]),
+        float(chance[named]) + math.log(len(terms)),
+    )
