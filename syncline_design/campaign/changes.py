@@ -15,8 +15,8 @@ not show would do for any change.
 An effect that differs from run to run while nothing is moved would pass for a change of it, or of a
 commoner one that moves the runs alike.  So the runs are held against that, too: L_a is how much
 likelier they are where effect a has a value of its own in every run, normal about the common one,
-and p_a the odds of it.  What clearly differs (Q of its runs, beside any trend of it and the likeliest
-change of all) is freed in each run to the extent that it does, for all others too.
+and p_a the odds of it.  What clearly differs (Q of its runs, beside any trend of it and the
+likeliest change of all) is freed in each run to the extent that it does, for all others too.
 Mixed over effects with weights w_c (the common ones have more) and over trends from any k with
 weights w_k, each of sum one (changes that did not happen yet count one),
     E_n = sum w_k w_c B_ck / (1 + sum p_a L_a)
@@ -43,7 +43,7 @@ from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
 from syncline_design.campaign.differing import clearly_differing
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Pool, Term, inverted
-from syncline_design.campaign.run_records import Change, Differing, Freed, Group, Runs
+from syncline_design.campaign.run_records import Change, Differing, Freed, SameSize, Runs
 from syncline_design.campaign.scatter import (
     APART,
     RunScatter,
@@ -82,12 +82,12 @@ class Changes:
         return self.pool.terms
 
     @cached_property
-    def groups(self) -> tuple[Group, ...]:
+    def groups(self) -> tuple[SameSize, ...]:
         """The terms by size: small matrices of one size are worked on at once."""
         sizes = sorted({term.size for term in self.terms})
         places = [[k for k, t in enumerate(self.terms) if t.size == size] for size in sizes]
         return tuple(
-            Group(np.array(own), np.array([self.terms[k].index for k in own])) for own in places
+            SameSize(np.array(own), np.array([self.terms[k].index for k in own])) for own in places
         )
 
     @cached_property

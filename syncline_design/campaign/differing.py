@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.pool import Term, inverted
-from syncline_design.campaign.run_records import Differing, Group, Runs
+from syncline_design.campaign.run_records import Differing, SameSize, Runs
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
@@ -24,7 +24,7 @@ def _own_covariance(normal: Array, term: Term) -> Array:
 
 
 def clearly_differing(
-    terms: Sequence[Term], groups: Sequence[Group], runs: Runs
+    terms: Sequence[Term], groups: Sequence[SameSize], runs: Runs
 ) -> Differing | None:
     """The effect that differs most clearly from run to run; None where noise would do.  One change
     of it is none, of any course."""

@@ -33,7 +33,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class SameSize:
     """Terms of one size: where they stand among all, and their parameters (G, p)."""
 
     terms: Index

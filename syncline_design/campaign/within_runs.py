@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from syncline_design.campaign.pool import Pool, inverted
-from syncline_design.campaign.run_records import Group
+from syncline_design.campaign.run_records import SameSize
 from syncline_design.effects.record import Array
 
 
-def scatter_within(pool: Pool, run: int, groups: Sequence[Group], known: Array) -> Array:
+def scatter_within(pool: Pool, run: int, groups: Sequence[SameSize], known: Array) -> Array:
     """Variance of each effect by the parts of one run over that fitted, (C,); known: its
     information (P, P) and the prior's, inverted.
 
@@ -28,7 +28,7 @@ def scatter_within(pool: Pool, run: int, groups: Sequence[Group], known: Array) 
     return np.asarray(np.max(found, axis=0))
 
 
-def _scatter(whole: Array, normals: Array, scores: Array, group: Group) -> Array:
+def _scatter(whole: Array, normals: Array, scores: Array, group: SameSize) -> Array:
     """Mean over an effect's parameters of the jackknife's variance over the fitted one, (G,).
 
     normals (n, P, P), scores (n, P): of a run without each of its parts.
