@@ -43,7 +43,7 @@ from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
 from syncline_design.campaign.differing import clearly_differing
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Pool, Term, inverted
-from syncline_design.campaign.run_records import Change, Differing, Freed, SameSize, Runs
+from syncline_design.campaign.run_records import Change, Differing, Freed, Runs, SameSize
 from syncline_design.campaign.scatter import (
     APART,
     RunScatter,

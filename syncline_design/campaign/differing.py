@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.pool import Term, inverted
-from syncline_design.campaign.run_records import Differing, SameSize, Runs
+from syncline_design.campaign.run_records import Differing, Runs, SameSize
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
