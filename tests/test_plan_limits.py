@@ -137,7 +137,14 @@ def test_of_an_arm_each_component_has_its_own_size(car: Path) -> None:
     assert {"x_m", "y_m"} <= set(sizes)
     assert sizes.get("z_m", math.inf) > 20.0 * max(sizes["x_m"], sizes["y_m"])
     words = " ".join(render_plan("markdown", unsized).split())
-    assert f"From x {1e3 * sizes['x_m']:.3g} mm or y" in words
+    (pair,) = unsized.result.pairs
+    if "z_m" in sizes:
+        last = f", and z from {1e3 * sizes['z_m']:.3g} mm on"
+    else:
+        last = "; z at no plausible size"
+    at = f"{1e3 * pair.sizes['x_m']:.3g} mm"
+    assert "Told apart in x and y, in z only" in words
+    assert f"in z alone: the drive below tells x {at} and y {at} of the first apart{last}" in words
     for stated in (f"[{1.05 * sizes['x_m']} m, 0 m, 0 m]", f"[0 m, {1.05 * sizes['y_m']} m, 0 m]"):
         found = planned_alone(car, f"{arm}={stated}", datum).result
         assert found.reached

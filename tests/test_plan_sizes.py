@@ -12,7 +12,18 @@ from scipy.optimize import minimize_scalar
 
 import syncline_design as sd
 from syncline_design.effects.record import Array
+from syncline_design.planning.lacking import lacking
+from syncline_design.planning.pairs import (
+    NONCENTRALITY,
+    noncentrality_of_first,
+    noncentrality_of_second,
+)
+from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.telling import PlanRun
+from syncline_design.planning.wanted import PlanWanted, separate_of
+from syncline_design.report.on_plan import on_plan
+from syncline_design.report.render_console import console
+from syncline_design.spec.load import load
 from tests.planned_specs import call, spec_with, world
 from tests.world.hidden import hidden
 from tests.world.worldlog import make_log
@@ -85,6 +96,64 @@ def test_by_how_much_a_latency_beats_a_lag_is_what_the_world_says(sized: PlanRun
     (pair,) = sized.result.pairs
     assert 0.95 * free < pair.noncentrality < 1.05 * held
     assert held < 0.5 * left(0.2, fitted=False)
+
+
+def test_a_latency_told_by_its_size_is_as_certain_as_without_the_lag(sized: PlanRun) -> None:
+    """To first order neither has a figure with both free: the page said "reached" and "not seen" of
+    the same.  Without the lag the sigma is that of the world's slope, weighted by its scatter."""
+    run, draws, small_s = world(sized), 200, 1e-3
+    clean = make_log(run).error()
+    scattered = np.array([make_log(replace(run, seed=k)).error() for k in range(draws)])
+    scattered -= scattered.mean(axis=0)
+    covariance = np.einsum("kri,krj->rij", scattered, scattered) / (draws - 1)
+    weight = np.linalg.inv(covariance) * (draws - 5) / (draws - 1)
+    late = make_log(run, (hidden("latency", "position", latency_s=small_s),)).error() - clean
+    last = sized.result.after[-1]
+    assert last.sigma == {
+        f"{LATENCY}.latency_s": pytest.approx(_weighed(late / small_s, weight) ** -0.5, rel=0.06)
+    }
+    grown = [one.noncentrality for one in sized.result.after]
+    assert grown == sorted(grown)  # type: ignore[type-var]
+    assert grown[-1] == sized.result.pairs[0].noncentrality
+    assert LAG not in " ".join(sized.result.unseen)
+    words = " ".join(console(on_plan(sized)).split())
+    assert "Noncentrality of the pair" in words
+    assert "only the size of latency (position) tells them apart" in words
+    own = words.split("The field's standard line plans")[0]
+    assert "not seen" not in own
+    assert "Correlation" not in own
+
+
+def test_a_noncentrality_is_of_the_effect_that_it_stands_beside(spec: Path) -> None:
+    """One parameter each: v^2 / sigma^2, both ways.  It was the smaller one, said of the first."""
+    found = sd.plan(spec, separate=("latency(attitude)", LATENCY)).result
+    (pair,) = found.pairs
+    sigma = found.after[-1].sigma
+    assert pair.back is not None
+    own = (pair.sizes["latency_s"] / sigma["latency(attitude).latency_s"]) ** 2
+    back = (pair.back.sizes["latency_s"] / sigma[f"{LATENCY}.latency_s"]) ** 2
+    assert own != pytest.approx(back, rel=0.1)
+    assert pair.noncentrality == pytest.approx(own, rel=0.01)
+    assert pair.back.noncentrality == pytest.approx(back, rel=0.01)
+    assert pair.separated == (min(own, back) >= pair.wanted)
+
+
+def test_what_fails_is_named_first(spec: Path) -> None:
+    """Of a drive that is next to nothing: the weaker of the two, with its own figure."""
+    pair = separate_of("latency(attitude)", LATENCY)
+    setup = Setup.begun(load(spec), PlanRequest(PlanWanted((), pair), line_plans=False))
+    (goal,) = setup.goal.pairs
+    named = set()
+    for information in (told.at(0, 0.0) for told in setup.told[:8]):
+        first, second = (
+            noncentrality_of_first(information, goal), noncentrality_of_second(information, goal)
+        )  # fmt: skip
+        lost = lacking(setup, information)
+        if lost is not None and lost.asked == NONCENTRALITY:
+            assert lost.value == min(first, second)
+            named.add(lost.what.split(" and ")[0])
+            assert lost.what.startswith("latency(attitude)" if first <= second else LATENCY)
+    assert LATENCY in named
 
 
 def test_a_class_is_told_at_once_and_what_no_drive_tells_is_left_out(spec: Path) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.planning.drives import WholeDrive, whole_information
+from syncline_design.planning.pairs import NONCENTRALITY, noncentrality_of, noncentrality_of_first
 from syncline_design.planning.result import CalmWater, DearLeg, Lacking
-from syncline_design.planning.search import NONCENTRALITY, noncentrality_of
 from syncline_design.planning.setup import Setup
 from syncline_design.planning.wanted import text_of
 
@@ -30,8 +30,10 @@ def lacking(setup: Setup, information: Array) -> Lacking | None:
     asked = np.flatnonzero(np.isfinite(setup.goal.tolerance))
     if at >= len(asked):
         pair = setup.goal.pairs[at - len(asked)]
-        found = noncentrality_of(information, pair)
-        return Lacking(" and ".join(pair.names), None, found, NONCENTRALITY)
+        found, names = noncentrality_of(information, pair), pair.names
+        if not pair.known and found < noncentrality_of_first(information, pair):
+            names = (names[1], names[0])
+        return Lacking(" and ".join(names), None, found, NONCENTRALITY)
     k = int(asked[at])
     own = ratios[at] * setup.goal.tolerance[k]
     return Lacking(setup.keys[setup.goal.wanted[k]], None, float(own), setup.goal.tolerance[k])

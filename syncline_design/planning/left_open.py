@@ -56,7 +56,8 @@ def unseen(setup: Setup, information: Array) -> tuple[str, ...]:
     """
     groups: dict[str, list[int]] = {}
     for k, one in enumerate(setup.world.every):
-        groups.setdefault(text_of(setup.system, one), []).append(k)
+        if k not in setup.goal.out_by_size:
+            groups.setdefault(text_of(setup.system, one), []).append(k)
     found = []
     for text, places in groups.items():
         hidden = _hidden(setup, information, places)

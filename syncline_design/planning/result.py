@@ -33,12 +33,23 @@ class After(Record):
     sigma: standard uncertainty of what is asked, with the named pair (else all of --reach) and the
     noise free; null where the log says nothing of it.  sigma_all: with every applicable effect
     free, within the priors.  correlation: of the named pair, the largest canonical one.
+    noncentrality: of the named pair where its size is known, which decides whether it is told.
     """
 
     leg: str
     sigma: Mapping[str, Unbounded]
     sigma_all: Mapping[str, Unbounded]
     correlation: float | None
+    noncentrality: float | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class ToldBack(Record):
+    """The same of a pair the other way about: the effect named second, of these sizes [SI], over
+    the first refitted."""
+
+    noncentrality: float
+    sizes: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +57,10 @@ class Separated(Record):
     """A pair of effects: correlation, noncentrality reached and asked.
 
     noncentrality: twice the log likelihood by which the true effect, of the size stated, beats its
-    rival refitted, on average; sizes: of the first effect's parameters, SI.  told_from: of a pair
-    that is not told apart and whose size is not known, the sizes of each parameter alone from which
-    this drive tells it, to first order, where they are plausible.
+    rival refitted, on average; sizes: of the first effect's parameters, SI.  back: the other way
+    about, where no size is known: told apart is what is told both ways.  told_from: of a pair that
+    is not told apart and whose size is not known, the sizes of each parameter alone from which this
+    drive tells it, to first order, where they are plausible.
     """
 
     first: str
@@ -59,6 +71,7 @@ class Separated(Record):
     separated: bool
     sizes: Mapping[str, float]
     told_from: Mapping[str, float] | None = optional()
+    back: ToldBack | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +88,7 @@ class StandardPlan(Record):
     sigma: Mapping[str, Unbounded]
     correlation: float | None
     minutes: float | None
+    noncentrality: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,14 +121,16 @@ class Flown(Record):
     reached: bool
     cautions: tuple[str, ...] | None = optional()
     confused: tuple[str, ...] | None = optional()
+    noncentrality: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
 class Lacking(Record):
     """What is furthest from what is asked, SI.
 
-    what: a parameter, of which value is the sigma, or a pair, of which it is the noncentrality;
-    beside: the other effect, with which left free that is the sigma.  asked: what value is held to.
+    what: a parameter, of which value is the sigma, or a pair, of which it is the noncentrality: of
+    the effect named first over the other; beside: the other effect, with which left free that is
+    the sigma.  asked: what value is held to.
     """
 
     what: str

@@ -20,14 +20,9 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import Deadline
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.effort import Effort
-from syncline_design.planning.information import (
-    canonical_correlation,
-    covariance_of,
-    noncentrality,
-    schur,
-    sigmas,
-)
+from syncline_design.planning.information import covariance_of, sigmas
 from syncline_design.planning.others import TWICE, VAGUE, Others
+from syncline_design.planning.pairs import pair_ratio
 from syncline_design.planning.placing import (
     LegTold,
     Place,
@@ -37,11 +32,8 @@ from syncline_design.planning.placing import (
     legs_s,
     way_of,
 )
-from syncline_design.planning.wanted import Goal, PairGoal
+from syncline_design.planning.wanted import Goal
 
-NONCENTRALITY: Final = 60.0  # at which a rival fits worse by more than 15 nat nine times in ten
-LEAST_SEEN: Final = 1e-9  # of a parameter's information, below which a rival makes all of it
-SAME: Final = 0.99  # correlation above which two effects stay one class
 MOST_LEGS: Final = 240
 MARGIN: Final = 0.95  # of what is asked that a search aims at first, for the joints between legs
 LEAST_GAIN: Final = 1e-4
@@ -160,42 +152,6 @@ class Standing:
         """What is not reached, and the same with what all other effects together take of it."""
         loss = self.loss(margin)
         return loss, loss + CONFUSED * self.taken
-
-
-def pair_ratio(information: Array, pair: PairGoal) -> float:
-    """1 or less where the better of two effects beats its rival, however that is refitted."""
-    found = noncentrality_of(information, pair)
-    ratio = math.sqrt(NONCENTRALITY / max(found, 1e-9))
-    correlation = canonical_correlation(information, pair.first, pair.second)
-    blocked = 0.0 if pair.known else (correlation / SAME) ** 8
-    return max(ratio, blocked if correlation > SAME else 0.0)
-
-
-def noncentrality_of(information: Array, pair: PairGoal) -> float:
-    """Of the effect named first where its size is known, beyond first order where that can be;
-    else of the weaker of the two."""
-    if pair.beyond is not None:
-        own, rival = pair.beyond
-        return max(float(schur(information, (own,), rival)[0, 0]), 0.0)
-    if pair.known:
-        return float(pair.sizes @ schur(information, pair.first, pair.second) @ pair.sizes)
-    return min(
-        noncentrality(information, pair.first, pair.second, pair.sizes),
-        noncentrality(information, pair.second, pair.first, pair.second_sizes),
-    )
-
-
-def told_from(information: Array, pair: PairGoal) -> Array:
-    """Sizes [SI] of the effect named first, each parameter alone, from which it is told apart (p,);
-    infinite for what is never told.
-
-    To first order the noncentrality of one of size v is v^2 (G_AA - G_AB G_BB^-1 G_BA)_kk, so that
-    two effects whose correlation makes them one class are told apart all the same where one is
-    large.
-    """
-    alone = np.diag(schur(information, pair.first, pair.second))
-    seen = alone > LEAST_SEEN * np.diag(information)[list(pair.first)]
-    return np.where(seen, np.sqrt(NONCENTRALITY / np.where(seen, alone, 1.0)), np.inf)
 
 
 @dataclass(slots=True)

@@ -31,10 +31,11 @@ from syncline_design.planning.information import (
 )
 from syncline_design.planning.legs import MOST_LEG_S, Leg
 from syncline_design.planning.others import Others, others_of
+from syncline_design.planning.pairs import noncentrality_of, pair_ratio
 from syncline_design.planning.path import joined
 from syncline_design.planning.placing import LegTold
-from syncline_design.planning.search import PlanJudge, noncentrality_of, pair_ratio
-from syncline_design.planning.singular import HeldPlaces, told_beside
+from syncline_design.planning.search import PlanJudge
+from syncline_design.planning.singular import HeldPlaces, told_beside, told_by_size
 from syncline_design.planning.vehicle import vehicles
 from syncline_design.planning.wanted import (
     Goal,
@@ -116,7 +117,7 @@ class Setup:
         share = BEST_LEGS * SECONDS * request.minutes / (4.0 * sum(t.leg.duration_s for t in told))
         alike = tuple(_words(p) for p in goal.pairs if _is_one(library, p))
         goal, apart = _separable(goal, library, share)
-        goal, held = told_beside(world.every, goal, library)
+        goal, held = told_beside(world.every, told_by_size(goal, library), library)
         others, untold = others_of(world.every, goal, library, prior, [one.held for one in held])
         judge = PlanJudge(goal, prior, others)
         return cls(case, request, world, goal, judge, told, apart, alike, untold, foreign, held)

@@ -55,6 +55,25 @@ def told_beside(
     return Goal(order, np.array([tolerance[k] for k in order]), goal.pairs), tuple(found)
 
 
+def told_by_size(goal: Goal, library: Array) -> Goal:
+    """The goal without the rival of the first pair, where the two are one to first order and only
+    the size that is known tells them apart.
+
+    With both free at zero neither has a figure, whatever is driven: what the drive makes of the
+    first is then told as it is once the rival is out, and so is what other effects take of it.
+    """
+    pair = goal.pairs[0] if goal.pairs else None
+    if pair is None or pair.beyond is None:
+        return goal
+    if not _lost(library, [*pair.first, *pair.second]):
+        return goal
+    asked = np.isfinite(goal.tolerance)
+    kept = [
+        i for i, k in enumerate(goal.wanted) if asked[i] or k in pair.first or k not in pair.second
+    ]
+    return Goal(tuple(goal.wanted[i] for i in kept), goal.tolerance[kept], goal.pairs)
+
+
 def _lost(information: Array, index: list[int]) -> set[int]:
     """Of some parameters those that the information on all of them together does not tell."""
     if not index:

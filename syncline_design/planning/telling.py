@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from syncline_design import __version__
 from syncline_design.diagnosis.result import SpecRead
-from syncline_design.effects.record import Array
+from syncline_design.effects.record import Array, Parameter
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
@@ -28,6 +28,14 @@ from syncline_design.planning.information import (
 )
 from syncline_design.planning.lacking import dear_legs, in_calm_water
 from syncline_design.planning.left_open import confused, held, unseen, untold
+from syncline_design.planning.pairs import (
+    NONCENTRALITY,
+    noncentrality_of,
+    noncentrality_of_first,
+    noncentrality_of_second,
+    pair_ratio,
+    told_from,
+)
 from syncline_design.planning.path import PathStates, unasked
 from syncline_design.planning.planned_log import Drive
 from syncline_design.planning.result import (
@@ -39,12 +47,7 @@ from syncline_design.planning.result import (
     PlanProvenance,
     Separated,
     StandardPlan,
-)
-from syncline_design.planning.search import (
-    NONCENTRALITY,
-    noncentrality_of,
-    pair_ratio,
-    told_from,
+    ToldBack,
 )
 from syncline_design.planning.setup import SECONDS, Setup
 from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
@@ -182,24 +185,38 @@ class Telling:
             self._sigma(information),
             {key: float(s) for key, s in zip(self.setup.keys, every, strict=True)},
             self._correlation(information),
+            self._noncentrality(information),
         )
 
+    def _noncentrality(self, information: Array) -> float | None:
+        """Of the first pair where its size is known: that decides whether it is told."""
+        if not self.setup.goal.pairs or not self.setup.goal.pairs[0].known:
+            return None
+        return noncentrality_of(information, self.setup.goal.pairs[0])
+
     def _separated(self, information: Array, pair: PairGoal) -> Separated:
-        own = [self.setup.world.every[k].parameter for k in pair.first]
-        names = [one.name for one in own]
+        own, other = (
+            [self.setup.world.every[k].parameter for k in places]
+            for places in (pair.first, pair.second)
+        )
         apart = pair_ratio(information, pair) <= 1.0
-        larger = {}
+        larger, back = {}, None
         if not (apart or pair.known):
             sizes = zip(own, told_from(information, pair), strict=True)
             larger = {one.name: float(size) for one, size in sizes if size <= one.high}
+        if not pair.known:
+            back = ToldBack(
+                noncentrality_of_second(information, pair), _sized(other, pair.second_sizes)
+            )
         return Separated(
             *pair.names,
             canonical_correlation(information, pair.first, pair.second),
-            noncentrality_of(information, pair),
+            noncentrality_of_first(information, pair),
             NONCENTRALITY,
             apart,
-            dict(zip(names, map(float, pair.sizes), strict=True)),
+            _sized(own, pair.sizes),
             larger or None,
+            back,
         )
 
     def _legs(self, found: WholeDrive) -> tuple[PlannedLeg, ...]:
@@ -259,6 +276,7 @@ class Telling:
                     self._sigma(information),
                     self._correlation(information),
                     None if legs is None else one.duration_s(legs) / SECONDS,
+                    self._noncentrality(information),
                 )
             )
         return tuple(found)
@@ -295,7 +313,12 @@ class Telling:
             self.setup.judge.enough(drives.information),
             drives.cautions or None,
             confused(self.setup, drives.information) or None,
+            self._noncentrality(drives.information),
         )
+
+
+def _sized(parameters: Sequence[Parameter], sizes: Array) -> dict[str, float]:
+    return {one.name: float(size) for one, size in zip(parameters, sizes, strict=True)}
 
 
 def _out_of_sight(driven: Drive) -> Iterator[str]:

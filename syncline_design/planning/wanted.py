@@ -225,6 +225,15 @@ class Goal:
     pairs: tuple[PairGoal, ...]
 
     @property
+    def out_by_size(self) -> tuple[int, ...]:
+        """The rival of the first pair where only the size that is known tells it, so that what is
+        wanted is told without it."""
+        pair = self.pairs[0] if self.pairs else None
+        if pair is None or pair.beyond is None:
+            return ()
+        return () if set(pair.second) & set(self.wanted) else pair.second
+
+    @property
     def only_rival(self) -> NDArray[np.bool_]:
         """Which of what is wanted is only what an effect of known size is to be told from.
 

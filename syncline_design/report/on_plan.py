@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Final
 
 from syncline_design.machine.records import with_texts
 from syncline_design.planning.legs import speed_words
 from syncline_design.planning.path import PathStates
-from syncline_design.planning.result import Flown, Plan, Separated
+from syncline_design.planning.result import Plan, Separated
 from syncline_design.planning.telling import PlanRun
 from syncline_design.report import charts_plan as drawings
 from syncline_design.report import numbers
@@ -33,6 +33,8 @@ from syncline_design.report.plan_sentences import (
     figure,
     how_far,
     outcome,
+    pair_figure,
+    pair_head,
     parameter,
     sentences,
     would_take,
@@ -61,7 +63,7 @@ def on_plan(run: PlanRun) -> Document:
             *section("after", "What is known after each leg", _after(found), "After"),
             *section("pairs", "Told apart", _pairs(found), "Pairs"),
             *section("standard", "The field's standard line plans", _standard(found), "Standard"),
-            *section("flown", "What was flown", _flown(found.flown), "Flown"),
+            *section("flown", "What was flown", _flown(found), "Flown"),
             *section("open", "What stays unseen", _open(found), "Unseen"),
             *section("log", "What the log needs", _log(found), "Log"),
             *section("targets", "Targets", _targets(found)),
@@ -109,28 +111,44 @@ def _path(run: PlanRun) -> list[Node]:
 
 
 def _after(found: Plan) -> list[Node]:
-    keys, sizes = list(found.after[-1].sigma), _column_sizes(found)
+    keys, sizes = _shown(found), _column_sizes(found)
 
-    def row(name: str, values: Mapping[str, float], correlation: float | None = None) -> Row:
+    def row(name: str, values: Mapping[str, float], of_pair: str = "") -> Row:
         shown = [Cell(figure(k, values[k], sizes[k]) if k in values else "", _sort(values.get(k)))
                  for k in keys]  # fmt: skip
-        last = "" if correlation is None else correlation_words(correlation)
-        return (name, *shown, Cell(last))
+        return (name, *shown, Cell(of_pair))
 
-    rows = [row(one.leg, one.sigma, one.correlation) for one in found.after]
+    rows = [row(one.leg, one.sigma, pair_figure(one)) for one in found.after]
     rows += [row("asked", found.tolerance)] if found.tolerance else []
     rows.append(row("all effects free", found.after[-1].sigma_all))
-    heads = ("After leg", *(f"{parameter(k)} #" for k in keys), "Correlation #")
+    heads = ("After leg", *(f"{parameter(k)} #" for k in keys), f"{pair_head(found)} #")
     note = (
         "Standard uncertainties with what is asked and the noise free; the last row with every "
         "effect free that this system can have, within its prior. What has a double (the latencies "
         "of all sensors together, the two lever arms) stays at its prior there, whatever is driven."
+        f"{_without_rival(found)}"
     )
     nodes = show(table("After each leg", heads, rows, note), silent=True)
     if not found.tolerance or len(found.after) < 2:
         return nodes
     caption = "Standard uncertainty over what is asked, after each leg."
     return [*nodes, Chart("after", partial(drawings.after, found), caption)]
+
+
+def _without_rival(found: Plan) -> str:
+    """That a rival which only the size tells is not among what is free."""
+    if not found.pairs or any(k.startswith(f"{found.pairs[0].second}.") for k in _shown(found)):
+        return ""
+    first, second = map(effect_words, (found.pairs[0].first, found.pairs[0].second))
+    return (
+        f" To first order {first} and {second} are one, and only the size of {first} tells them "
+        f"apart: its standard uncertainty is the one without {second}."
+    )
+
+
+def _shown(found: Plan) -> Sequence[str]:
+    """The parameters whose standard uncertainty is told."""
+    return list(found.after[-1].sigma)
 
 
 def _sort(value: float | None) -> float:
@@ -142,27 +160,37 @@ def _pairs(found: Plan) -> list[Node]:
 
 
 def _pair_text(one: Separated) -> str:
-    """`latency(position) of 2 ms from lever_arm(position): told apart; correlation ...`."""
-    sizes = ", ".join(figure(name, size) for name, size in one.sizes.items())
+    """`latency(position) of 2 ms from lever_arm(position): told apart; noncentrality ...`."""
     said = "told apart" if one.separated else "not told apart"
+    wanted = numbers.number(one.wanted, 3)
+
+    def way(first: str, sizes: Mapping[str, float], noncentrality: float) -> tuple[str, str]:
+        size = ", ".join(figure(name, size) for name, size in sizes.items())
+        least = " in the direction that shows least" if one.back and len(sizes) > 1 else ""
+        return f"{first} of {size}", f"{numbers.number(noncentrality, 3)} of {wanted}{least}"
+
+    size, reached = way(one.first, one.sizes, one.noncentrality)
+    if one.back is None:
+        return f"{size} from {one.second}: {said}; noncentrality {reached}"
+    back_size, back = way(one.second, one.back.sizes, one.back.noncentrality)
     return (
-        f"{one.first} of {sizes} from {one.second}: {said}; correlation "
-        f"{correlation_words(one.correlation)}, noncentrality "
-        f"{numbers.number(one.noncentrality, 3)} of {numbers.number(one.wanted, 3)}"
+        f"{size} from {one.second}: {said}; correlation {correlation_words(one.correlation)}, "
+        f"noncentrality {reached}; the other way about, of {back_size}, {back}"
     )
 
 
 def _standard(found: Plan) -> list[Node]:
     if not found.standard:
         return []
-    keys = list(found.after[-1].sigma)
-    rows = [_standard_row("this drive", found, found.after[-1].sigma, found.after[-1].correlation,
-                          found.duration_s / 60.0 if found.reached else None, keys)]  # fmt: skip
+    own, keys = found.after[-1], _shown(found)
+    minutes = found.duration_s / 60.0 if found.reached else None
+    rows = [_standard_row("this drive", found, own.sigma, pair_figure(own), minutes)]
     rows += [
-        _standard_row(one.name, found, one.sigma, one.correlation, one.minutes, keys)
+        _standard_row(one.name, found, one.sigma, pair_figure(one), one.minutes)
         for one in found.standard
     ]
-    heads = ("Plan", "Until reached #", *(f"{parameter(k)} #" for k in keys), "Correlation #")
+    heads = ("Plan", "Until reached #", *(f"{parameter(k)} #" for k in keys),
+             f"{pair_head(found)} #")  # fmt: skip
     note = (
         "Until what is asked is reached, and told from every other effect that some drive tells "
         "it from. Line plans are taken line by line in their order; the turns between lines count "
@@ -172,26 +200,26 @@ def _standard(found: Plan) -> list[Node]:
 
 
 def _standard_row(
-    name: str, found: Plan, sigma: Mapping[str, float], correlation: float | None,
-    minutes: float | None, keys: list[str],
-) -> tuple[Cell | str, ...]:  # fmt: skip
+    name: str, found: Plan, sigma: Mapping[str, float], of_pair: str, minutes: float | None
+) -> tuple[Cell | str, ...]:
     sizes = _column_sizes(found)
     reached = Cell("never" if minutes is None else numbers.drive_time(minutes),
                    _sort(minutes))  # fmt: skip
     return (
         name,
         reached,
-        *(Cell(figure(k, sigma[k], sizes[k]), _sort(sigma[k])) for k in keys),
-        Cell("" if correlation is None else correlation_words(correlation)),
+        *(Cell(figure(k, sigma[k], sizes[k]), _sort(sigma[k])) for k in _shown(found)),
+        Cell(of_pair),
     )
 
 
-def _flown(flown: Flown | None) -> list[Node]:
+def _flown(found: Plan) -> list[Node]:
+    flown = found.flown
     if flown is None:
         return []
     lines = [f"{parameter(key)}: {figure(key, value)}" for key, value in flown.sigma.items()]
-    if flown.correlation is not None:
-        lines.append(f"correlation {correlation_words(flown.correlation)}")
+    if pair_figure(flown):
+        lines.append(f"{pair_head(found).lower()} {pair_figure(flown)}")
     said = "reaches what is asked" if flown.reached else "does not reach what is asked"
     files = ", ".join(flown.files)
     words = f"{files}: {numbers.count(flown.rows)} rows, {numbers.time(flown.duration_s)}; {said}."

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.figure_text import format_duration, format_like, format_quantity
 from syncline_design.model.quantity import si_name, split_suffix, suffix_unit
 from syncline_design.model.unit_table import Dimension
-from syncline_design.planning.result import HeldEffect, Lacking, Plan, Separated
+from syncline_design.planning.result import (
+    After,
+    Flown,
+    HeldEffect,
+    Lacking,
+    Plan,
+    Separated,
+    StandardPlan,
+)
 from syncline_design.planning.run import LONGEST_S
 from syncline_design.report import numbers
 from syncline_design.report.document import Inline, Outcome
@@ -34,11 +42,23 @@ def outcome(found: Plan) -> Outcome:
             rest = f"{rest}, in waves only"
         return Outcome("good", "\u2713", f"Reached by {legs} in {length}{rest}")
     if found.least_minutes is None and _larger(found) is not None:
-        return Outcome("bad", "\u2717", "Told apart only where it is larger")
+        return Outcome("bad", "\u2717", _told_in_part(found))
     if found.least_minutes is None:
         why = "no drive of this platform tells it" if found.inseparable else _none_found(found)
         return Outcome("bad", "\u2717", f"Not reachable: {why}")
     return Outcome("bad", "\u2717", f"Not reached in {numbers.number(found.minutes, 6)} min")
+
+
+def _told_in_part(found: Plan) -> str:
+    """Which of an effect's parameters the drive tells apart, and of which only a large one."""
+    one = _larger(found)
+    assert one is not None
+    told, later, never = _by_size(one)
+    if not told:
+        return "Told apart only where it is larger"
+    names = [sentence_list([split_suffix(n)[0] for n in part]) for part in (told, later, never)]
+    rest = f"in {names[1]} only where it is larger" if later else f"in {names[2]} not"
+    return f"Told apart in {names[0]}, {rest}"
 
 
 def _none_found(found: Plan) -> str:
@@ -102,8 +122,9 @@ def _in_calm_water(found: Plan) -> Iterator[Inline]:
 def _lacking(one: Lacking) -> str:
     """What fails, with its figure."""
     if " and " in one.what:
+        own, rival = one.what.split(" and ")
         value, asked = numbers.number(one.value, 3), numbers.number(one.asked, 3)
-        return f"{one.what} are not told apart: noncentrality {value} of {asked} asked"
+        return f"{own} is not told from {rival}: noncentrality {value} of {asked} asked"
     value, asked = figure(one.what, one.value), figure(one.what, one.asked)
     if one.beside is None:
         return f"{parameter(one.what)} stays at {value}, where {asked} is asked"
@@ -163,17 +184,51 @@ def _larger(found: Plan) -> Separated | None:
 
 
 def _told_where_larger(one: Separated) -> Iterator[Inline]:
-    """A pair of which only the size decides whether it can be told."""
-    sizes = one.told_from or {}
-    each = [f"{split_suffix(name)[0]} {figure(name, size)}" for name, size in sizes.items()]
-    least = " or ".join(each) if len(one.sizes) > 1 else figure(*next(iter(sizes.items())))
+    """A pair of which only the size decides whether it can be told, parameter by parameter."""
+    told, later, never = _by_size(one)
+    sizes, several = one.told_from or {}, len(one.sizes) > 1
+    least = " or ".join(_sized(n, sizes) if several else figure(n, sizes[n]) for n in later)
+    rest = "".join(f", and {split_suffix(n)[0]} from {figure(n, sizes[n])} on" for n in later)
+    lost = sentence_list([split_suffix(name)[0] for name in never])
+    alike = f"look nearly alike on every drive (correlation {correlation_words(one.correlation)})"
+    if told:
+        small = sentence_list([split_suffix(name)[0] for name in (*later, *never)])
+        at = sentence_list([_sized(name, one.sizes) for name in told])
+        begins = f"{alike} in {small} alone: the drive below tells {at} of the first apart{rest}"
+    else:
+        begins = f"{alike}, so that a small effect is not told"
+        begins += f". From {least} of the first on, the drive below tells them apart"
+    begins += f"; {lost} at no plausible size" if never else ""
     yield (
-        f"{one.first} and {one.second} look nearly alike on every drive (correlation "
-        f"{correlation_words(one.correlation)}), so that a small effect is not told. From "
-        f"{least} of the first on, the "
-        "drive below tells them apart. Where its size is known, --separate with "
+        f"{one.first} and {one.second} {begins}. Where its size is known, --separate with "
         f"{one.first}=SIZE plans for it."
     )
+
+
+def _by_size(one: Separated) -> tuple[list[str], list[str], list[str]]:
+    """The parameters of the first effect that are told at the size that matters, those from a
+    larger one on, and those at none that is plausible."""
+    from_size = one.told_from or {}
+    told = [name for name, size in one.sizes.items() if from_size.get(name, math.inf) <= size]
+    later = [name for name in one.sizes if name in from_size and name not in told]
+    return told, later, [name for name in one.sizes if name not in from_size]
+
+
+def _sized(name: str, sizes: Mapping[str, float]) -> str:
+    return f"{split_suffix(name)[0]} {figure(name, sizes[name])}"
+
+
+def pair_head(found: Plan) -> str:
+    """What of the first pair decides whether it is told: its noncentrality where its size is known,
+    so that what its slopes have in common decides nothing."""
+    return "Correlation" if found.after[-1].noncentrality is None else "Noncentrality"
+
+
+def pair_figure(one: After | StandardPlan | Flown) -> str:
+    """The figure under that head; empty without a pair."""
+    if one.noncentrality is not None:
+        return numbers.number(one.noncentrality, 3)
+    return "" if one.correlation is None else correlation_words(one.correlation)
 
 
 def correlation_words(value: float) -> str:
@@ -200,8 +255,11 @@ def facts(found: Plan) -> Iterator[tuple[str, str]]:
         words = figure(key, value, asked)
         asks = "" if asked is None else f" (asked: {figure(key, asked, asked)})"
         yield parameter(key), words + asks
-    if last.correlation is not None:
-        yield "Correlation of the pair", correlation_words(last.correlation)
+    words = pair_figure(last)
+    if last.noncentrality is not None:
+        words = f"{words} (asked: {numbers.number(found.pairs[0].wanted, 3)})"
+    if words:
+        yield f"{pair_head(found)} of the pair", words
 
 
 def figure(key: str, value: float | None, like: float | None = None) -> str:
