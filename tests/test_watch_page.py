@@ -107,3 +107,11 @@ def test_an_interval_has_the_place_of_its_estimate() -> None:
     assert format_estimate(1.5425e-3, 0.1e-3, "s") == "1.54 ± 0.10 ms"
     assert format_interval(1.5425e-3, 0.1e-3, (1.344e-3, 1.74e-3), "s") == "1.34 ms to 1.74 ms"
     assert format_interval(2.0, 0.0, (1.0, 3.25), "m") == "1 m to 3.25 m"
+
+
+def test_evidence_is_told_in_one_way() -> None:
+    told = [
+        e_value_text(value) for value in (0.784, 40.2, 990.0, 996.0, 1.1e5, 3.5e7, 4.5e44, 1e300)
+    ]
+    assert told == ["0.78", "40", "990", "1.0e+03", "1.1e+05", "3.5e+07", "4.5e+44",
+                    "more than 1e+299"]  # fmt: skip

@@ -19,11 +19,14 @@ from syncline_design.model.figure_text import to_digits
 SCHEMA: Final = "syncline-design/watch/v1"
 WatchOutcome = Literal["unchanged", "alarm"]
 MOST_EVIDENCE: Final = 1e299  # beyond it evidence is not told apart
+WHOLE: Final = 995.0  # from which evidence is told by its power of ten
 
 
 def e_value_text(value: float) -> str:
     """An e-value to two figures, everywhere alike: `40`, `1.6e+03`, `more than 1e+299`."""
-    return "more than 1e+299" if value >= MOST_EVIDENCE else to_digits(value, 2)
+    if value >= MOST_EVIDENCE:
+        return "more than 1e+299"
+    return f"{value:.1e}" if value >= WHOLE else to_digits(value, 2)
 
 
 @dataclass(frozen=True, slots=True)
