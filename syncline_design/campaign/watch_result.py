@@ -14,7 +14,7 @@ from syncline_design.diagnosis.result import (
 )
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
-from syncline_design.model.figure_text import to_digits
+from syncline_design.model.figure_text import to_digits, to_power
 
 SCHEMA: Final = "syncline-design/watch/v1"
 WatchOutcome = Literal["unchanged", "alarm"]
@@ -26,7 +26,7 @@ def e_value_text(value: float) -> str:
     """An e-value to two figures, everywhere alike: `40`, `1.6e+03`, `more than 1e+299`."""
     if value >= MOST_EVIDENCE:
         return "more than 1e+299"
-    return f"{value:.1e}" if value >= WHOLE else to_digits(value, 2)
+    return to_power(value) if value >= WHOLE else to_digits(value, 2)
 
 
 @dataclass(frozen=True, slots=True)

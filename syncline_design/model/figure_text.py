@@ -154,6 +154,11 @@ def to_digits(value: float, digits: int = 6) -> str:
     return _trimmed(text)
 
 
+def to_power(value: float, digits: int = 2) -> str:
+    """`digits` significant figures and a power of ten: `1.1e+05`."""
+    return f"{value:.{digits - 1}e}" if math.isfinite(value) else _not_finite(value)
+
+
 def _trimmed(text: str) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
