@@ -343,4 +343,6 @@ def test_figures_read_as_people_write_them() -> None:
     assert format_estimate(-0.37, 0.004, "m") == "-37.0 ± 0.4 cm"
     assert format_estimate(0.01745329252, 0.0001745, "rad") == "1.000 ± 0.010 deg"
     assert format_estimate(2.5, 0.12) == "2.50 ± 0.12"
+    assert format_estimate(659e-6, 5317e-6, "m") == "1 ± 5 mm"
+    assert format_estimate(768e-6, 937e-6, "m") == "768 ± 937 um"
     assert format_estimate(0.0, None, "s") == "0 s"

@@ -143,7 +143,7 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
         )
         for own in said
     )
-    words = evidence_words(one.gain, one.log_p / math.log(10.0))
+    words = evidence_words(one.gain, one.log_p / math.log(10.0), noise_kept=True)
     aliases = tuple(_rival(told, b) for b in one.rivals)
     total = 1.0 + sum(_odds(b.nats_worse) for b in aliases)
     aliases = tuple(replace(b, probability=_odds(b.nats_worse) / total) for b in aliases)

@@ -82,11 +82,12 @@ def finding(
 ) -> Finding:
     """A missing effect in words; rivals: aliases, lookalikes, excluded."""
     text = in_words(effect, sensor, parameters)
+    texts = texts_of(parameters)
     return Finding(
         effect.name,
         sensor,
         stage,
-        parameters,
+        {name: replace(own, text=texts[name]) for name, own in parameters.items()},
         *rivals,
         sentence=text[0].upper() + text[1:],
         evidence=evidence,
@@ -102,10 +103,15 @@ def finding(
     )
 
 
-def evidence_words(gain: float, log10_p: float | None) -> str:
-    """What an effect saves, and the chance that noise alone saves as much (None: none at all)."""
+def evidence_words(gain: float, log10_p: float | None, *, noise_kept: bool = False) -> str:
+    """What an effect saves, and the chance that noise alone saves as much (None: none at all).
+
+    noise_kept: against the noise that is left with it, and not against one that is fitted anew
+    without it, which would take much of a large effect for noise.
+    """
     chance = format_chance(log10_p)
-    return f"saves {format_nats(gain)}; noise alone does that with a chance of {chance}"
+    kept = " with the noise kept" if noise_kept else ""
+    return f"saves {format_nats(gain)}{kept}; noise alone does that with a chance of {chance}"
 
 
 def is_noise(effect: Effect) -> bool:

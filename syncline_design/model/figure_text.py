@@ -75,9 +75,15 @@ def format_duration(duration_s: float) -> str:
 
 def format_estimate(value: float, uncertainty: float | None = None, unit: str = "") -> str:
     """`87.1 ± 0.3 ms`: the uncertainty to one or two figures (GUM 7.2.6), the value to the same
-    place, both in the unit that reads best.
+    place, both in the unit that reads best for the larger of them.
     """
-    return _estimate(value, uncertainty, *_rung(abs(value), unit))
+    return _estimate(value, uncertainty, *_rung(_larger(value, uncertainty), unit))
+
+
+def _larger(value: float, uncertainty: float | None) -> float:
+    """What decides the unit of both: a value within its uncertainty says no more than that."""
+    known = uncertainty is not None and math.isfinite(uncertainty)
+    return max(abs(value), uncertainty) if known and uncertainty else abs(value)
 
 
 def _estimate(value: float, uncertainty: float | None, name: str, scale: float) -> str:
@@ -100,7 +106,7 @@ def format_interval(
 ) -> str:
     """`1.35 ms to 1.74 ms`: the ends of an interval in the unit and to the place in which
     `format_estimate` tells the value; without an uncertainty to four figures each."""
-    name, scale = _rung(abs(value), unit)
+    name, scale = _rung(_larger(value, uncertainty), unit)
     spread = uncertainty / scale
     known = spread > 0.0 and math.isfinite(spread)
     texts = [to_places(end / scale, _places(spread)) if known else to_digits(end / scale, 4)
@@ -111,8 +117,8 @@ def format_interval(
 def format_estimates(
     column: Sequence[tuple[float, float | None]], unit: str = ""
 ) -> tuple[str, ...]:
-    """Values with their uncertainties in one unit, that of the largest value, to be compared."""
-    name, scale = _rung(max((abs(value) for value, _ in column), default=0.0), unit)
+    """Values with their uncertainties in one unit, that of the largest, to be compared."""
+    name, scale = _rung(max((_larger(*one) for one in column), default=0.0), unit)
     return tuple(_estimate(value, spread, name, scale) for value, spread in column)
 
 
