@@ -77,6 +77,30 @@ def test_a_device_that_repeats_its_last_reading_breaks_its_latency(
     assert told.groups == ()
 
 
+@pytest.mark.parametrize("columns", [(), ("north", "east", "down")])
+def test_the_return_of_a_receiver_that_hung_is_no_speed(
+    columns: Sequence[str], tmp_path: Path
+) -> None:
+    """Its places jump by what it missed; the velocities of the log, or none, know better."""
+    run = world("fixed_wing_circuits", 2)
+    spec, log = files(tmp_path, run)
+    from_s = fastest_s(run)
+    log = held(log, PLACES, from_s, from_s + 8.0)
+    lines = [line.split(",") for line in log.read_text("utf-8").splitlines()]
+    left = [f"velocity_{axis}_mps" for axis in columns]
+    kept = [k for k, name in enumerate(lines[0]) if name not in left]
+    log.write_text("\n".join(",".join(line[k] for k in kept) for line in lines) + "\n", "utf-8")
+    told = accept(load(spec), [log], AcceptSettings(("latency", "speed")), seed=0)
+    rows = {(row.role, row.assumption): row for row in told.assumptions}
+    assert rows["position", "latency"].status == "broken"
+    (speed,) = [row for row in told.assumptions if row.assumption == "speed"]
+    limit = run.carriers[0].v_max_mps
+    assert speed.status == "holds", speed
+    assert speed.measured is not None
+    assert speed.measured.value is not None
+    assert 0.5 * limit < speed.measured.value < limit
+
+
 def test_readings_that_are_held_all_along_or_on_a_vehicle_that_rests_are_none(
     tmp_path: Path,
 ) -> None:

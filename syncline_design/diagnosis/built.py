@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.changed_instead import changed_instead
+from syncline_design.diagnosis.checks import MEAN_S
 from syncline_design.diagnosis.consequence import expected_rms_m
 from syncline_design.diagnosis.episodes import without_episodes
 from syncline_design.diagnosis.fitting import Data, Model
@@ -24,6 +25,7 @@ from syncline_design.diagnosis.instead import InItsPlace, in_place
 from syncline_design.diagnosis.late_runs import late_runs
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
 from syncline_design.diagnosis.looked_up import Mask
+from syncline_design.diagnosis.motion_columns import with_slopes
 from syncline_design.diagnosis.noise_split import NoiseFactors, factors
 from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis
@@ -43,6 +45,9 @@ from syncline_design.diagnosis.stretches import (
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
 from syncline_design.effects import plain_delay, registry
+from syncline_design.effects.record import Array
+from syncline_design.logs.derivatives import derived_velocity
+from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -87,7 +92,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
     with one_thread():
         inputs = measured(case, paths)
         one = examined(inputs, settings)
-        beyond = beyond_limits(one.data.view)
+        first = one
         held, taken = _held(inputs, one), list[Stands]()
         seen = Stretches(held) if held else _seen(one)
         for _ in range(ROUNDS + bool(held)):
@@ -107,13 +112,33 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             replace(seen, stands=stands),
             left,
             factors(one.data, model, one.search.unlike or ()),
-            beyond,
+            beyond_limits(_moving(inputs, first, one, taken)),
             tuple(taken),
             in_place(one.data, model, one.search.signatures),
             inputs.log.ends_s,
             left_as_one(one.data, model, one.search.signatures),
             1.0 - len(one.inputs.log) / len(inputs.log),
         )
+
+
+def _moving(
+    inputs: Measured, first: SearchedLog, last: SearchedLog, taken: Sequence[Stands]
+) -> Scene:
+    """The log by whose motion its limits are judged.
+
+    Columns of motion that contradict the poses for what was taken out alone are borne out by the
+    rest.  Slopes of poses are none of the vehicle's beside rows that are no poses of that time: a
+    receiver that hung jumps on its return.
+    """
+    if first.faults or not taken:
+        return first.data.view
+    log = with_slopes(inputs.log, last.replaced)
+    derived = any(s.follows_position or s.follows_reference for s in log.stages)
+    if derived or last.replaced:
+        over_s = max(MEAN_S.values())
+        wide = [replace(one, margin_s=one.margin_s + over_s) for one in taken]
+        log = log.rows(~_rows_of(log.time_s, wide))
+    return scene(inputs.system, log, inputs.known)
 
 
 def _held(inputs: Measured, one: SearchedLog) -> tuple[Stands, ...]:
@@ -223,13 +248,28 @@ def _built_in_undone(one: SearchedLog) -> Model:
 
 def _less(inputs: Measured, taken: Sequence[Stands], least: float) -> Measured | None:
     """The log without some stretches; None where that is nothing, or leaves too few rows."""
-    time_s = inputs.log.time_s
-    inside = np.zeros(len(time_s), bool)
-    for one in taken:
-        if one.stamps_s:
-            inside |= np.isin(time_s, one.stamps_s)
-            continue
-        inside |= (time_s >= one.from_s - one.margin_s) & (time_s <= one.to_s + one.margin_s)
+    inside = _rows_of(inputs.log.time_s, taken)
     if not np.any(inside) or np.sum(~inside) < least:
         return None
-    return replace(inputs, log=inputs.log.rows(np.flatnonzero(~inside)), reread=None)
+    left = inputs.log.rows(np.flatnonzero(~inside))
+    return replace(inputs, log=_derived_anew(left), reread=None)
+
+
+def _derived_anew(log: Log) -> Log:
+    """A log with velocities that are slopes of the places that it holds, where they are slopes."""
+    stages = tuple(
+        replace(s, velocity_mps=derived_velocity(log.time_s, s.antenna_m))
+        if s.follows_position and s.antenna_m is not None and s.velocity_track is None
+        else s
+        for s in log.stages
+    )
+    return replace(log, stages=stages)
+
+
+def _rows_of(time_s: Array, taken: Sequence[Stands]) -> Mask:
+    """Rows in which something stands out, and those by which its ends may be off."""
+    inside = np.zeros(len(time_s), bool)
+    for one in taken:
+        within = (time_s >= one.from_s - one.margin_s) & (time_s <= one.to_s + one.margin_s)
+        inside |= np.isin(time_s, one.stamps_s) if one.stamps_s else within
+    return inside
