@@ -136,6 +136,34 @@ def test_a_delay_that_grows_is_told_by_the_largest_that_acted(tmp_path: Path) ->
     assert "grows from" in row.evidence
 
 
+def test_many_late_rows_are_no_witness_of_each_other(tmp_path: Path) -> None:
+    """One row in eight: those too small to be far off are no sound ones."""
+    spec, log = mixed(tmp_path, "attitude", 0.2, here_and_there(0.125, 8))
+    _, found = looked_at(spec, log)
+    ((one,),) = found
+    assert (one.sensor, one.single) == ("attitude", True)
+    assert abs(one.delay_s - 0.2) < 3.0 * one.spread_s < 0.02
+
+
+def test_a_delay_that_grows_begins_before_it_is_far_off(tmp_path: Path) -> None:
+    """What is left of its beginning would be something else (an arm that comes and goes)."""
+    run = world("fixed_wing_circuits", 2, 80.0, 8.0)
+    sound = make_log(run)
+    time_s = sound.columns["time_s"] - sound.columns["time_s"][0]
+    delay_s = np.where((time_s > 30.0) & (time_s < 60.0), (time_s - 30.0) / 30.0 * 0.3, 0.0)
+    columns = dict(sound.columns)
+    for name in OF["position"]:
+        columns[name] = np.interp(time_s - delay_s, time_s, columns[name])
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(sound.spec_yaml(), "utf-8")
+    _, found = looked_at(spec, write_columns(tmp_path / "log.csv", columns))
+    ((one,),) = found
+    assert one.ends_s is not None
+    assert one.ends_s[0] == pytest.approx(0.0, abs=0.01)
+    assert one.delay_s == pytest.approx(0.3, abs=0.01)
+    assert time_s[one.rows[0]] == pytest.approx(30.0, abs=0.5)
+
+
 def test_what_is_no_delay_is_none(tmp_path: Path) -> None:
     """Noise twenty times as loud for a while or here and there, and an arm that is knocked."""
     run = world(*RUN)

@@ -100,6 +100,30 @@ def test_a_session_beyond_the_bound_is_broken_however_many_good_ones_lie_beside_
     assert row.measured.low == pytest.approx(1e-2, rel=0.01)  # what that session shows itself
 
 
+@pytest.mark.parametrize("good", [4, 8])
+def test_a_bad_session_a_thousand_times_off_is_no_other_unit_and_has_its_own_figure(
+    clocked: Path, good: int
+) -> None:
+    """Tables of 2 us and one of 1.5 ms that scatters as the others do: another unit moves both.
+
+    A bound over few sessions of which one is so unlike the others is hundreds of times as large.
+    """
+    rng = np.random.default_rng(6)
+    logs = []
+    for day, mean_s in enumerate([*[0.0] * good, 1.5e-3]):
+        off_us = 1e6 * (mean_s + 2e-6 * rng.standard_normal(240))
+        rows = [f"{1.8e9 + 86400 * day + 30 * k:.0f},{x:.4f}" for k, x in enumerate(off_us)]
+        logs.append(write(clocked.parent / f"{day}.csv", ["time_s,offset_us", *rows]))
+    found = accept(load(clocked), logs, AcceptSettings(("clock",)), seed=0)
+    (row,) = found.assumptions
+    assert (row.status, found.exit_code) == ("broken", 1), row
+    assert row.measured is not None
+    assert row.measured.value == pytest.approx(1.5e-3, rel=0.02)
+    assert row.measured.high is not None
+    assert row.measured.high > 2.0 * row.measured.value
+    assert "a session was 1.50" in row.evidence
+
+
 @pytest.mark.parametrize(
     ("sigma_s", "sessions", "timeline", "status", "words"),
     [

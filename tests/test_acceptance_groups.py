@@ -144,6 +144,8 @@ def test_no_drive_tells_two_arms_apart(found: Diagnosis, short: Path) -> None:
     assert group.tell_apart is None
     text = render_acceptance("markdown", told)
     assert "No drive tells these apart" in text
+    alone = [row for row in told.assumptions if row.status == "not_shown" and not row.one_of]
+    assert f"at least one of 2 broken, 0 broken, {len(alone)} more not shown" in text
 
 
 def test_every_format_names_the_group(found: Diagnosis, short: Path) -> None:

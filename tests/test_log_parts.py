@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from syncline_design.logs.given_once import demand_once
 from syncline_design.logs.log import Log
 from syncline_design.logs.reading import read_log
 from syncline_design.spec.load import BadInput
@@ -102,3 +103,15 @@ def test_the_part_that_is_cut_off_is_named(tmp_path: Path) -> None:
     log = read_log(files, ["uav"])
     assert any(note.startswith("b.csv is cut off in line") for note in log.notes)
     assert log.rejected["cut off in the last row"] == 1
+
+
+def test_a_log_that_is_given_twice_is_refused(tmp_path: Path) -> None:
+    """By its name or as a copy; parts of one size are no copies."""
+    first, second = pieces(columns())
+    one, part = write(tmp_path / "a.csv", first), write(tmp_path / "b.csv", second)
+    copy = tmp_path / "c.csv"
+    copy.write_bytes(one.read_bytes())
+    demand_once([one, part])
+    for given in ([one, part, one], [one, copy]):
+        with pytest.raises(BadInput, match="the same log is given twice"):
+            demand_once(given)

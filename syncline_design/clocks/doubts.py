@@ -124,8 +124,8 @@ def _levels(sessions: Sequence[ClockSession]) -> Iterator[str]:
 def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
     """Sessions whose levels stand a thousand apart, with nothing between.
 
-    Within one table a bad start moves the level of a session alone, another unit its scatter too.
-    The format of a daemon fixes its unit: between two of its files nothing is mixed up.
+    A bad start moves the level of a session alone, another unit its scatter too.  The format of a
+    daemon fixes its unit: between two of its files nothing is mixed up.
     """
     levels = [(float(np.median(np.abs(s.offsets))), s) for s in sessions if s.is_counted]
     levels = sorted((level for level in levels if level[0] > 0.0), key=lambda level: level[0])
@@ -137,11 +137,13 @@ def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
         tables = [s for s in (small, large) if s.series.kind.family == "csv"]
         if high <= 100.0 * low or not tables or not _is_unit(ratio):
             continue
+        if not _is_unit(_scatter(large) / _scatter(small)):
+            continue
         if apart:
             yield (f"offsets in {large.series.files[0]} are {to_digits(ratio, 3)} times those in "
                    f"{small.series.files[0]}: are the units the same?")  # fmt: skip
             return
-        if large.series.kind.family == "csv" and _is_unit(_scatter(large) / _scatter(small)):
+        if large.series.kind.family == "csv":
             at = moment(float(large.series.time_s[0]), large.series.kind.stamps)
             yield (f"{large.series.kind.name}: in {large.series.files[0]} offsets and their "
                    f"scatter are {to_digits(ratio, 3)} times as large in the session from {at}: is "

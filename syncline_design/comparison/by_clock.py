@@ -45,27 +45,37 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
     if found.doubts:
         return Judgement("not_shown", f"the clock logs are in doubt: {found.doubts[0]}")
     seen = seen_s(found)
-    if one.value is not None and seen > max(one.value, found.bound_s or 0.0):
-        off, asked = format_duration(seen), format_duration(one.value)
-        said = f"a session was {off} off, more than the {asked} assumed"
-        return Judgement("broken", said, MeasuredFigure(seen, seen, seen))
+    if one.value is not None and seen > one.value:
+        return _beyond(one.value, seen, found)
     if found.bound_s is None or one.value is None:
         return Judgement("not_shown", f"the clock logs bound nothing: {found.claim.why_not}")
     figure = MeasuredFigure(found.bound_s, min(seen, found.bound_s), found.bound_s)
     asked, measured = format_duration(one.value), format_duration(found.bound_s)
-    if found.bound_s > one.value and seen <= one.value:
+    if found.bound_s > one.value:
         said = f"measured bound {measured}, more than the {asked} assumed, but no session was "
         return Judgement("not_shown", f"{said}{_not_beyond(one.value, found)}", figure)
-    if found.bound_s > one.value:
-        times = f"{to_digits(found.bound_s / one.value, 3)} times" if one.value else "not"
-        said = f"measured bound {measured}, {times} the {asked} assumed"
-        return Judgement("broken", said, figure)
     why = _why_not(one.value, found, resting) or _of_what(one, found)
     if not why and one.holdover_s is not None:
         why = no_free_run(one.holdover_s, found)
     status: AssumptionStatus = "not_shown" if why else "holds"
     lead = f"measured bound {measured} within the {asked} assumed"
     return Judgement(status, lead + (why or _rests_on(found)), figure)
+
+
+def _beyond(assumed_s: float, seen: float, found: Timing) -> Judgement:
+    """A session that was beyond what is assumed: by how much, and up to where others may be.
+
+    A bound over few sessions of which one is unlike the others says how little is known of the next
+    one (a hundred times as much as any was), not how far the clock is off.
+    """
+    times = f", {to_digits(seen / assumed_s, 3)} times" if assumed_s else ", more than"
+    said = (
+        f"a session was {format_duration(seen)} off{times} the {format_duration(assumed_s)} assumed"
+    )
+    most = max(seen, found.bound_s or 0.0)
+    if most > seen:
+        said += f"; measured bound of all sessions {format_duration(most)}"
+    return Judgement("broken", said, MeasuredFigure(seen, seen, most))
 
 
 def seen_s(found: Timing) -> float:

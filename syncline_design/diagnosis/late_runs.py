@@ -14,6 +14,7 @@ delay that grows or falls evenly as well.  What is left has to be noise, Q <= ch
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -49,6 +50,8 @@ NEAR_S: Final = 1e-3  # to either side, over which errors are straight lines in 
 POLISHED: Final = 4  # steps
 CHANCE: Final = 1e-4  # that noise is louder than what is taken for noise
 BETTER_NATS: Final = 5.0  # by which a single row has to be late rather than sound
+WIDENED: Final = 3  # times that rows are added to those that are late
+_Told = tuple[Array, Array]  # delays and their spreads
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,33 +123,74 @@ def _late(asked: LateRows, sensor: ActsOn) -> Late | None:
     looked = LookedUp.of(asked, sensor)
     if looked is None:
         return None
-    log = asked.of.view.log
-    most_s = min(MOST_S, 0.5 * log.duration_s)
+    most_s = min(MOST_S, 0.5 * asked.of.view.log.duration_s)
     for shape in (ONE,) if asked.single else (ONE, *GROWING):
         start = _on_a_grid(looked, np.array(shape), most_s if shape == ONE else MOST_GROWN_S)
         told = None if start is None else _at_least(looked, start)
-        if told is None:
-            continue
-        delays, spreads = told
-        largest = int(np.argmax(np.abs(delays)))
-        if abs(float(delays[largest])) >= (LEAST_SINGLE_S if asked.single else LEAST_S):
-            rows = _single(looked, delays) if asked.single else np.flatnonzero(asked.inside)
-            off_m = np.linalg.norm(np.nan_to_num(asked.of.view.error())[rows], axis=1)
-            ends_s = None if len(delays) < 2 else (float(delays[0]), float(delays[1]))
-            return Late(sensor, rows, float(delays[largest]), float(spreads[largest]), off_m,
-                        ends_s, asked.single)  # fmt: skip
+        if told is not None and asked.single:
+            looked, told = _with_all_single(looked, told)
+        elif told is not None and shape != ONE:
+            looked, told = _from_nothing_on(looked, told)
+        if told is not None and np.max(np.abs(told[0])) >= _least_s(asked):
+            return _told(looked, *told)
     return None
 
 
-def _single(looked: LookedUp, delays: Array) -> Index:
-    """Those far off, and others that are late rather than sound."""
-    late = looked.late
-    anywhere = looked.known(delays, ~late.elsewhere)
-    square = np.sum(looked.left(delays, anywhere) ** 2, axis=1)
-    better = 0.5 * (late.of.square[anywhere] - square) > BETTER_NATS
-    own = late.inside.copy()
-    own[anywhere[better]] = True
-    return np.flatnonzero(own)
+def _least_s(asked: LateRows) -> float:
+    return LEAST_SINGLE_S if asked.single else LEAST_S
+
+
+def _told(looked: LookedUp, delays: Array, spreads: Array) -> Late:
+    asked = looked.late
+    largest = int(np.argmax(np.abs(delays)))
+    rows = np.flatnonzero(asked.inside)
+    off_m = np.linalg.norm(np.nan_to_num(asked.of.view.error())[rows], axis=1)
+    ends_s = None if len(delays) < 2 else (float(delays[0]), float(delays[1]))
+    return Late(looked.sensor, rows, float(delays[largest]), float(spreads[largest]), off_m, ends_s,
+                asked.single)  # fmt: skip
+
+
+def _from_nothing_on(looked: LookedUp, told: _Told) -> tuple[LookedUp, _Told]:
+    """A delay that grows (or falls) with the rows in which it is too small to be far off."""
+    late, (delays, _) = looked.late, told
+    a, b = late.ends_s
+    grown_s = float(delays[-1] - delays[0])
+    if not abs(grown_s) > 0.0:
+        return looked, told
+    nothing_s = a - float(delays[0]) * (b - a) / grown_s
+    time_s = late.of.time_s
+    low, high = min(a, nothing_s), max(b, nothing_s)
+    rows = (time_s >= low) & (time_s <= high)
+    if np.any(rows & late.elsewhere) or np.sum(rows) > 2 * np.sum(late.inside):
+        return looked, told
+    wider = LookedUp.of(replace(late, inside=rows), looked.sensor)
+    rate = grown_s / (b - a)
+    ends = float(delays[0]) + rate * (time_s[rows][[0, -1]] - a)
+    more = None if wider is None else _at_least(wider, ends)
+    return (looked, told) if wider is None or more is None else (wider, more)
+
+
+def _with_all_single(looked: LookedUp, told: _Told) -> tuple[LookedUp, _Told]:
+    """Single rows that are late with those that are late rather than sound and not far off.
+
+    Taken for sound, these would be what the others are held against, and so would those of which
+    either may be: they are no witness.
+    """
+    unknown = looked.late.elsewhere
+    for _ in range(WIDENED):
+        late, (delays, _) = looked.late, told
+        anywhere = looked.known(delays, ~unknown)
+        square = np.sum(looked.left(delays, anywhere) ** 2, axis=1)
+        better = 0.5 * (late.of.square[anywhere] - square)
+        own, elsewhere = late.inside.copy(), unknown.copy()
+        own[anywhere[better > BETTER_NATS]] = True
+        elsewhere[anywhere[better > 0.0]] = True
+        wider = LookedUp.of(replace(late, inside=own, elsewhere=elsewhere & ~own), looked.sensor)
+        more = None if wider is None else _at_least(wider, delays)
+        if wider is None or more is None or np.array_equal(own, late.inside):
+            break
+        looked, told = wider, more
+    return looked, told
 
 
 def _on_a_grid(looked: LookedUp, shape: Array, most_s: float) -> Array | None:
@@ -162,7 +206,7 @@ def _on_a_grid(looked: LookedUp, shape: Array, most_s: float) -> Array | None:
     return best_s * shape
 
 
-def _at_least(looked: LookedUp, delays: Array) -> tuple[Array, Array] | None:
+def _at_least(looked: LookedUp, delays: Array) -> _Told | None:
     """The delays of least Q nearby and their spreads (Gauss-Newton); None where more than noise is
     left."""
     rows = looked.rows(delays)

@@ -12,6 +12,7 @@ from syncline_design.diagnosis.gross import Reread, mended
 from syncline_design.diagnosis.level import demand_level
 from syncline_design.effects.acting import Acting, acting_of
 from syncline_design.logs.columns import ISO_TIMES, known_names, shown
+from syncline_design.logs.given_once import demand_once
 from syncline_design.logs.log import Log
 from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.pose_pairs import lever_m
@@ -47,6 +48,7 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
     _demand_known_columns(case, choice.columns, names)
     ranges = system.stages[-1].ranging is not None
     files = list(paths) or own_files(case)
+    demand_once(files)
     first = system.stages[0]
     lever = lever_m(first.position, first.attitude) if len(names) == 1 else None
     poses = lever is not None

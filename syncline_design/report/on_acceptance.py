@@ -96,6 +96,8 @@ def _sentences(result: Acceptance) -> Iterator[str]:
     counts = {s: alone.count(s) for s in _ORDER}
     words = {s: _OUTCOMES[s][2] if n == 1 or s != "holds" else "hold" for s, n in counts.items()}
     of = [f"at least one of {len(one.rows)} broken" for one in result.groups]
+    if of:  # no row of a group is shown to be the one
+        words["not_shown"] = f"more {words['not_shown']}"
     told = ", ".join([*of, *(f"{n} {words[s]}" for s, n in counts.items())])
     noun = "assumption" if len(rows) == 1 else "assumptions"
     yield f"Of {len(rows)} {noun} of the verdict: {told}."
