@@ -22,6 +22,7 @@ from syncline_design.diagnosis.noise_split import NoiseFactor, NoiseFactors
 from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis, Finding
 from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
+from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.spec.load import load
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 from tests.acceptance_samples import (
@@ -90,6 +91,16 @@ def noise_rows(told: Diagnosis, split: dict[str, NoiseFactors],
     sight = Sighted(told, factors=factors, **seen)
     log = LogEvidence(told, OnPaper(load(EXAMPLE), ()), "multirotor", sight=sight)
     return {role: by_log(row_of(role, "noise"), log) for role in split}
+
+
+def test_noise_beside_a_drift_that_is_undone_keeps_its_interval(found: Diagnosis) -> None:
+    """The drift that an arm hides is no part of how far readings scatter; it is said."""
+    drift = LeftOpen(("heading_drift", "attitude", 0), "multirotor", "rate_radps", "rad/s", 9.0,
+                     1e-6, ("lever_arm", "position", 0))  # fmt: skip
+    row = noise_rows(noisy(found, 3.0), {"attitude": LOUD}, open=(drift,))["attitude"]
+    assert row.status == "broken"
+    assert row.measured == MeasuredFigure(3.0, 2.5, 3.5)
+    assert "more of it may be there: heading_drift" in row.words
 
 
 @pytest.mark.parametrize(

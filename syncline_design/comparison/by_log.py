@@ -66,9 +66,9 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
             one, breaking, standing, broken_figure(one, log, breaking), readings(log.split(one))
         )
         undone = list(log.parts.undone(one, _width(said.measured)))
+        if one.name == "noise":  # how far it scatters is not what constants and drifts hide
+            return replace(said, words=_with_more(said, undone))
         said = _but_for(said, undone, log.parts.room_undone(one), _is_signed(one))
-        if one.name == "noise":
-            return said
         said = _in_all(one, said, log) or said
         return beside_shapes(one, _or_more(one, said, log), log, signed=_is_signed(one))
     moved = [each for each in shifts(one, log.found) if log.is_sure(one, each.finding)]
@@ -155,8 +155,13 @@ def _but_for(said: Judgement, undone: Sequence[str], room: float, signed: bool) 
     """
     if not undone:
         return said
-    words = f"{said.words}; more of it may be there: {'; '.join(undone)}"
-    return replace(said, words=words, measured=_with_room(said.measured, room, signed))
+    measured = _with_room(said.measured, room, signed)
+    return replace(said, words=_with_more(said, undone), measured=measured)
+
+
+def _with_more(said: Judgement, undone: Sequence[str]) -> str:
+    more = f"; more of it may be there: {'; '.join(undone)}" if undone else ""
+    return f"{said.words}{more}"
 
 
 def _with_room(figure: MeasuredFigure | None, room: float, signed: bool) -> MeasuredFigure | None:

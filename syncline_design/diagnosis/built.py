@@ -39,6 +39,7 @@ from syncline_design.diagnosis.stretches import (
     Stands,
     Stretches,
     in_stretches,
+    is_inside,
     left_as_one,
     stretches,
 )
@@ -168,7 +169,8 @@ def _late(inputs: Measured, view: Scene, data: Data, held: Mask) -> Iterator[Sta
         stamps_s = time_s[first.rows]
         yield Stands(
             (delay.name, first.sensor, 0), stage, float(stamps_s[0]), float(stamps_s[-1]), names,
-            (first.delay_s,), (first.spread_s,), -math.inf, True, fits, inside=True,
+            (first.delay_s,), (first.spread_s,), -math.inf, True, fits,
+            inside=is_inside(float(stamps_s[0]), float(stamps_s[-1]), inputs.log.ends_s),
             margin_s=0.0 if first.single else MARGIN_ROWS * inputs.log.interval_s, share=share,
             explained=1.0, ends=first.ends_s,
             stamps_s=tuple(map(float, stamps_s)) if first.single else (),

@@ -70,8 +70,12 @@ class Late:
 
 
 def late_runs(view: Scene, held: Mask) -> list[tuple[Late, ...]]:
-    """Of every run within a log of one vehicle, and of the single rows, each device that fits, what
-    is late before what is early.  held: rows of which more is known already."""
+    """Of every run of a log of one vehicle, and of the single rows, each device that fits, what is
+    late before what is early.  held: rows of which more is known already.
+
+    A run at either end of the log is none that comes and goes: stamps that step or run off, or what
+    is built in and changed once, are looked for there by the search.
+    """
     log = view.log
     if len(view.system.stages) != 1 or log.stages[0].antenna_m is None:
         return []
@@ -86,7 +90,7 @@ def late_runs(view: Scene, held: Mask) -> list[tuple[Late, ...]]:
 
 def _asked(weighed: Weighed, far: Mask, held: Mask) -> Iterator[LateRows]:
     """Runs, the longest first, then the rows that are far off in none of them."""
-    runs = list(_runs(weighed.time_s, far, held))
+    runs = [one for one in _runs(weighed.time_s, far, held) if _comes_and_goes(weighed, one)]
     in_runs = np.zeros(len(far), bool)
     for run in runs:
         in_runs |= run
@@ -102,13 +106,18 @@ def _runs(time_s: Array, far: Mask, held: Mask) -> Iterator[Mask]:
     at = np.flatnonzero(far)
     apart = (np.diff(time_s[at]) > APART_S) & (np.diff(at) > APART_ROWS)
     parts = np.split(at, np.flatnonzero(apart) + 1)
-    ends_s = float(time_s[0]), float(time_s[-1])
     for part in sorted(parts, key=len, reverse=True):
         rows = np.zeros(len(far), bool)
         rows[part[0] : part[-1] + 1] = True
         dense = len(part) >= max(LEAST_ROWS, DENSE * np.sum(rows)) and not np.any(held & rows)
-        if dense and is_inside(float(time_s[part[0]]), float(time_s[part[-1]]), ends_s):
+        if dense:
             yield rows
+
+
+def _comes_and_goes(weighed: Weighed, run: Mask) -> bool:
+    """Whether it begins and ends within the log."""
+    inside_s = weighed.time_s[run]
+    return is_inside(float(inside_s[0]), float(inside_s[-1]), weighed.view.log.ends_s)
 
 
 def _fits(asked: LateRows) -> Sequence[Late]:
