@@ -182,7 +182,8 @@ def _demand_parts(offers: Sequence[Offer], parts: set[Role]) -> None:
         raise refuse(
             path,
             "no stream of attitudes",
-            expected="attitudes of the vehicle, to lay lever arms along",
+            expected="attitudes of the vehicle, to lay lever arms along, and to ask whether one of "
+            "0 m is as short",
             hint="name one: log: {streams: {attitude: NAME}}",
         )
 
