@@ -129,6 +129,22 @@ def test_a_later_stage_without_a_velocity_is_told_why_it_needs_one(tmp_path: Pat
         checked(written(log, tmp_path, dropped))
 
 
+def test_columns_of_a_stage_behind_another_sign_are_told_the_underscore(tmp_path: Path) -> None:
+    """`auv.range_m` stood in the list of what was found, without a word on what is wrong."""
+
+    def dotted(columns: dict[str, Array]) -> None:
+        for name in [n for n in columns if n.startswith("auv_")]:
+            columns[name.replace("auv_", "AUV.", 1)] = columns.pop(name)
+
+    log = make_log(scenario("survey_chain", 3, 20.0, 5.0))
+    with pytest.raises(BadInput) as refused:
+        checked(written(log, tmp_path, dotted))
+    words = str(refused.value)
+    assert "columns are missing: auv_range_m" in words
+    assert "AUV.range_m would be auv_range_m (and 2 more so)" in words
+    assert "map them in the spec: log: {columns: {auv_range_m: AUV.range_m}}" in words
+
+
 def late(stem: str, by_s: float) -> Change:
     def change(columns: dict[str, Array]) -> None:
         stamps = columns["time_s"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from syncline_design.planning.others import TWICE, Others, taken_by
 from syncline_design.planning.wanted import Goal
-from syncline_design.report import on_plan
+from syncline_design.report import on_plan, plan_sentences
 from syncline_design.report.document import Text
 
 
@@ -31,3 +31,15 @@ def test_speeds_of_a_drive_are_in_metres_per_second() -> None:
     path = SimpleNamespace(velocity_mps=np.array([[0.755, 0.0, 0.0]]))
     (words,) = (n for n in on_plan._legs(SimpleNamespace(legs=()), path) if isinstance(n, Text))
     assert str(words.words).replace("\u00a0", " ").startswith("The drive begins at 0.755 m/s")
+
+
+def test_components_that_are_left_alike_are_told_together() -> None:
+    """One figure for an arm's three parts, not the same words three times."""
+    arm = "lever_arm(position)"
+    left = {f"{arm}.x_m": 0.1412, f"{arm}.y_m": 0.1411, f"{arm}.z_m": 0.143,
+            "latency(position).latency_s": 0.0973}  # fmt: skip
+    told = plan_sentences._left(SimpleNamespace(tolerance={}), left)  # type: ignore[arg-type]
+    assert told.replace("\u00a0", " ") == (
+        "lever arm x and y (position) at 141 mm, lever arm z (position) at 143 mm, "
+        "latency (position) at 97.3 ms"
+    )

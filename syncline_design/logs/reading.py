@@ -185,8 +185,26 @@ def _missing(draft: _Draft, names: Sequence[str], hint: str = NAME_THEM) -> Exce
         line=1,
         column=1,
         found=", ".join(draft.table.header[:20])[:500] or "no columns",
-        hint=hint,
+        hint=_spelt_otherwise(draft.table.header, names) or hint,
     )
+
+
+def _spelt_otherwise(header: Sequence[str], names: Sequence[str]) -> str:
+    """That what is missing is there but for capitals or the signs between its words; or nothing."""
+    there = {_letters(name): name for name in header}
+    alike = [(shown(n), there[_letters(shown(n))]) for n in names if _letters(shown(n)) in there]
+    if not alike:
+        return ""
+    wanted, found = alike[0]
+    more = f" (and {len(alike) - 1} more so)" if len(alike) > 1 else ""
+    return (
+        f"{found} would be {wanted}{more}: an underscore joins words, and a stage and its column; "
+        f"rename them there, or map them in the spec: log: {{columns: {{{wanted}: {found}}}}}"
+    )
+
+
+def _letters(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())
 
 
 def _complete_rows(

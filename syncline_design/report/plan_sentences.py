@@ -149,19 +149,28 @@ def would_take(confused: Sequence[str]) -> str:
 def _known_otherwise(found: Plan) -> str:
     """What no drive tells from what is asked, with what it leaves of that where it is free."""
     each = [
-        f"{effect_words(one.effect)} (would leave "
-        + ", ".join(
-            f"{parameter(key)} at {figure(key, sigma, found.tolerance.get(key))}"
-            for key, sigma in one.sigma.items()
-        )
-        + ")"
+        f"{effect_words(one.effect)} (would leave {_left(found, one.sigma)})"
         for one in found.untold or ()
     ]
     return (
         "Taken as known, since nothing that can be driven tells them from what is asked, or only "
-        f"what takes many times as long, the most harmful first: {'; '.join(each)}. Ask for one as "
-        "well to have it told."
+        f"what takes many times as long, the most harmful first: {'; '.join(each)}. Asked for as "
+        "well, one is told, or said not to be."
     )
+
+
+def _left(found: Plan, sigma: Mapping[str, float]) -> str:
+    """`lever arm x and y (position) at 141 mm, lever arm z (position) at 143 mm`."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for key, value in sigma.items():
+        place = key.rpartition(".")[0], figure(key, value, found.tolerance.get(key))
+        alike.setdefault(place, []).append(key)
+    parts = []
+    for (_, size), keys in alike.items():
+        own = [split_suffix(key.rpartition(".")[2])[0] for key in keys]
+        names = parameter(keys[0]).replace(f" {own[0]} (", f" {sentence_list(own)} (")
+        parts.append(f"{names if len(own) > 1 else parameter(keys[0])} at {size}")
+    return ", ".join(parts)
 
 
 def _held(one: HeldEffect) -> str:
