@@ -124,6 +124,32 @@ def test_readings_that_are_held_all_along_or_on_a_vehicle_that_rests_are_none(
     assert (one.sensor, one.first, one.last) == ("position", 1, 49)
 
 
+@pytest.mark.parametrize("creeps", [False, True])
+def test_a_reading_that_trembles_hangs_and_one_that_creeps_on_does_not(
+    creeps: bool, tmp_path: Path
+) -> None:
+    """A tenth of its noise about one place is no sound reading; a slow one that is far better than
+    its figure leaves its first place behind."""
+    run = world("fixed_wing_circuits", 2)
+    seen = scene(*_of(*files(tmp_path, run)))
+    first = seen.log.stages[0]
+    assert first.antenna_m is not None
+    stage = seen.system.stages[0].position
+    assert stage is not None
+    sigma = np.array(stage.sigma)
+    place, rows = first.antenna_m.copy(), np.arange(100, 140)
+    rng = np.random.default_rng(3)
+    place[rows] = place[99] + 0.1 * sigma * rng.uniform(-1.0, 1.0, (len(rows), 3))
+    velocity = first.velocity_mps.copy()
+    if creeps:  # by a fifth of its noise a row, with velocities that say so
+        step_m = 0.2 * float(np.min(sigma))
+        place[rows] = place[99] + step_m * (rows - 99)[:, None] * np.eye(3)[0]
+        velocity[98:142] = step_m / seen.log.interval_s * np.eye(3)[0]
+    log = replace(seen.log, stages=(replace(first, antenna_m=place, velocity_mps=velocity),))
+    found = [(one.sensor, one.first, one.last) for one in frozen(scene(seen.system, log))]
+    assert found == ([] if creeps else [("position", 100, 139)])
+
+
 def _of(spec: Path, log: Path) -> tuple[System, Log]:
     inputs = measured(load(spec), [log])
     return inputs.system, inputs.log

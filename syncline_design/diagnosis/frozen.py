@@ -1,7 +1,9 @@
 """Readings that a device gives over and over while the vehicle moves on: ever older data.
 
-A receiver that hangs repeats its last places to the last digit.  Rows j+1 to k repeat row j where
-all components are the same, so that the data of row k are t_k - t_j old.  A vehicle that stands
+A receiver that hangs repeats its last places to the last digit, or a filter behind it lets them
+tremble.  Rows j+1 to k repeat row j where no component is further from it than RESTS standard
+deviations of the sensor, which noise does in one row of 400, so that the data of row k are
+t_k - t_j old.  A vehicle that stands
 still gives such rows as well (a receiver that holds its place, a coarse figure): what counts are
 runs in which the motion moved the reading by more than MOVED standard deviations,
     d = |integral of v dt| (places), D |integral of w dt| (angles, D the range),
@@ -17,6 +19,7 @@ from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.record import ActsOn, Array
@@ -27,6 +30,7 @@ from syncline_design.model.system import Stage
 LEAST_ROWS: Final = 3  # that repeat a reading
 USUAL: Final = 3.0  # times the usual run of a log
 MOVED: Final = 5.0  # standard deviations of the reading
+RESTS: Final = 0.25  # standard deviations from the reading that is repeated
 SAME: Final = 1e-9  # of a reading's size, which interpolation between two equal ones leaves
 
 
@@ -47,24 +51,47 @@ def frozen(view: Scene) -> list[Frozen]:
     """All such runs of all sensors of a log, by sensor and time."""
     found: list[Frozen] = []
     for index, (stage, logged) in enumerate(zip(view.system.stages, view.log.stages, strict=True)):
-        for sensor, reading, sigma_m in _readings(stage, logged):
+        for sensor, reading, sigma, sigma_m in _readings(stage, logged):
             moved_m = _path(view, index, sensor, logged)
-            found += _runs(view.log.time_s, sensor, index, reading, moved_m, sigma_m)
+            repeats = _Repeats(view.log.time_s, reading, sigma, moved_m, sigma_m)
+            found += _runs(repeats, sensor, index)
     return found
 
 
-def _readings(stage: Stage, logged: StageLog) -> Iterator[tuple[ActsOn, Array, float]]:
-    """Columns (n, p) of every sensor, and what they scatter at the target by the spec [m]."""
+@dataclass(frozen=True, slots=True)
+class _Repeats:
+    """Readings (n, p) along their stamps with their standard deviations (p,), the place that they
+    would have gone through (n, q) [m] and what they scatter at the target [m]."""
+
+    time_s: Array
+    reading: Array
+    sigma: Array
+    path: Array
+    sigma_m: float
+
+    def last(self, fresh: int, most: int) -> int:
+        """The last row up to one that repeats a reading."""
+        size = np.maximum(np.abs(self.reading[fresh]), 1.0)
+        off = np.abs(self.reading[fresh : most + 1] - self.reading[fresh])
+        far = np.any(off > np.maximum(SAME * size, RESTS * self.sigma), axis=1)
+        return fresh + (int(np.argmax(far)) - 1 if np.any(far) else most - fresh)
+
+
+def _readings(stage: Stage, logged: StageLog) -> Iterator[tuple[ActsOn, Array, Array, float]]:
+    """Columns (n, p) of every sensor, what they scatter by the spec, and that at the target [m]."""
     reach_m = 1.0 if logged.range_m is None else float(np.median(logged.range_m))
     if logged.antenna_m is not None and stage.position is not None:
-        yield "position", logged.antenna_m, max(stage.position.sigma)
+        sigma = np.array(stage.position.sigma)
+        yield "position", logged.antenna_m, sigma, float(np.max(sigma))
     if stage.attitude is not None:
-        yield "attitude", logged.euler_rad, reach_m * max(stage.attitude.sigma)
+        sigma = np.array(stage.attitude.sigma)
+        yield "attitude", logged.euler_rad, sigma, reach_m * float(np.max(sigma))
     beam = (logged.range_m, logged.azimuth_rad, logged.elevation_rad)
     known = [column for column in beam if column is not None]
     if len(known) == len(beam) and stage.ranging is not None:
-        sigma = stage.ranging.sigma
-        yield "ranging", np.column_stack(known), max(sigma[0], reach_m * max(sigma[1:]))
+        sigma = np.array(stage.ranging.sigma)
+        at_target_m = max(float(sigma[0]), reach_m * float(np.max(sigma[1:])))
+        yield "ranging", np.column_stack(known), sigma, at_target_m
 
 
 def _path(view: Scene, index: int, sensor: ActsOn, logged: StageLog) -> Array:
@@ -85,20 +112,28 @@ def _summed(time_s: Array, slope: Array) -> Array:
     return np.concatenate([np.zeros((1, slope.shape[1])), np.cumsum(parts, axis=0)])
 
 
-def _runs(
-    time_s: Array, sensor: ActsOn, stage: int, reading: Array, path: Array, sigma_m: float
-) -> Iterator[Frozen]:
-    size = np.maximum(np.abs(reading[1:]), 1.0)
-    same = np.all(np.abs(np.diff(reading, axis=0)) <= SAME * size, axis=1)
+def _runs(of: _Repeats, sensor: ActsOn, stage: int) -> Iterator[Frozen]:
+    size = np.maximum(np.abs(of.reading[1:]), 1.0)
+    step = np.abs(np.diff(of.reading, axis=0))
+    usual = _usual_run(len(of.reading), _side_by_side(np.all(step <= SAME * size, axis=1)))
+    near = np.all(step <= np.maximum(SAME * size, 2.0 * RESTS * of.sigma), axis=1)
+    for first, most in _side_by_side(near):
+        fresh = first
+        while fresh < most:
+            last = of.last(fresh, most)
+            off = np.linalg.norm(of.path[fresh + 1 : last + 1] - of.path[fresh], axis=1)
+            long_enough = last - fresh >= max(LEAST_ROWS, math.ceil(USUAL * usual))
+            if long_enough and float(np.max(off)) > MOVED * of.sigma_m:
+                age_s = float(of.time_s[last] - of.time_s[fresh])
+                yield Frozen(sensor, stage, fresh + 1, last, age_s, off)
+                fresh = last
+            fresh += 1
+
+
+def _side_by_side(same: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """The fresh row and the last one of runs of rows that are the same as the row before."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
-    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]  # a: the fresh
-    usual = _usual_run(len(reading), runs)
-    for fresh, last in runs:
-        off = np.linalg.norm(path[fresh + 1 : last + 1] - path[fresh], axis=1)
-        long_enough = last - fresh >= max(LEAST_ROWS, math.ceil(USUAL * usual))
-        if long_enough and float(np.max(off)) > MOVED * sigma_m:
-            age_s = float(time_s[last] - time_s[fresh])
-            yield Frozen(sensor, stage, fresh + 1, last, age_s, off)
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _usual_run(rows: int, runs: list[tuple[int, int]]) -> float:
