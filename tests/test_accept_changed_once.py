@@ -111,6 +111,36 @@ def test_an_arm_that_is_off_and_changes_is_told_beside_the_other(tmp_path: Path)
     assert {first.label, *first.others} >= ARMS, first
 
 
+def drifting(spec: Path, log: Path) -> tuple[Data, Model, list[Signature]]:
+    """What a search that takes a turn for a heading that drifts leaves."""
+    data, model, known = settled(spec, log)
+    drift = Acting(registry()["heading_drift"], "attitude", 0, {"rate_radps": 0.0})
+    return data, fit(data, (drift,), start=model.level), known
+
+
+@pytest.mark.parametrize(("name", "seed"), [("multirotor_lines", 9), ("fixed_wing_circuits", 2)])
+def test_a_heading_that_is_turned_once_is_no_drift(name: str, seed: int, tmp_path: Path) -> None:
+    """Half a degree from 40 % on is 2 mrad and more off any line that grows."""
+    turn = hidden("mounting", "attitude", x_rad=0.0, y_rad=0.0, z_rad=0.0087)
+    data, model, known = drifting(*changed(tmp_path, name, seed, 0.4, turn))
+    first = stands_beside(data, model, known)[0]
+    assert first.sure
+    labels = {first.label, *first.others}
+    assert labels & {("mounting", "attitude", 0), ("heading_bias", "attitude", 0)}, first
+    assert first.from_s == pytest.approx(24.0, abs=1.0)
+    assert max(map(abs, first.values)) == pytest.approx(0.0087, rel=0.15)
+
+
+def test_a_heading_that_drifts_stays_one(tmp_path: Path) -> None:
+    """As much at its end as a turn would be in all of it."""
+    drift = hidden("heading_drift", "attitude", rate_radps=0.0087 / 60.0)
+    run = world("multirotor_lines", 9)
+    data, model, known = drifting(*files(tmp_path, run, (drift,)))
+    found = changed_instead(data, model, in_stretches(known))
+    assert found.model is model
+    assert found.hits == ()
+
+
 def test_stamps_that_step_stay_a_step(tmp_path: Path) -> None:
     """Neither arm fits a delay where the speed changes."""
     step = hidden("timestamp_step", "position", step_s=0.05, time_s=39.0)

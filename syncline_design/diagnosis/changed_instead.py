@@ -1,9 +1,10 @@
-"""What is built in and changed once, where the search took it for a step of stamps.
+"""What is built in and changed once, where the search took it for a step of stamps or a drift.
 
 The search knows no arm that is knocked: at much the same speed the step of a delay is the nearest
-word for it.  A step of stamps at t is therefore held against everything that is built in, from t to
-the end; one beside a delay of the same sensor, against it from the beginning to t as well.  Each is
-fitted again beside the rest of the model,
+word for it, and of a heading that is turned once one that drifts.  A drift is held against the
+change that is clearest without it.  A step of stamps at t is therefore held against everything that
+is built in, from t to the end; one beside a delay of the same sensor, against it from the beginning
+to t as well.  Each is fitted again beside the rest of the model,
     ln L = (S - S') / (2 s2) - (p / 2) ln N,
 S and S' the squares over the spec's noise before and after, s2 what the best of them leaves of a
 row's and p the figures.  A step that is no likelier by 4.5 nat is taken out of the model: what then
@@ -27,9 +28,12 @@ from syncline_design.diagnosis.noise import precision
 from syncline_design.diagnosis.once_changed import SURE
 from syncline_design.diagnosis.stretch_fits import AS_GOOD_NATS, Hit, as_loud, in_stretch
 from syncline_design.diagnosis.stretch_windows import log_chi2
+from syncline_design.diagnosis.stretches import changed_once
 from syncline_design.effects import plain_delay
 from syncline_design.effects.acting import Acting
 from syncline_design.machine.quick_dataclass import dataclass
+
+_Place = tuple[tuple[Label, ...], tuple[float, float]]  # what falls, and where something acts [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +60,9 @@ def changed_instead(data: Data, model: Model, asked: Sequence[Signature]) -> Cha
     """
     built_in = [s for s in asked if not s.candidate.effect.passing]
     found = ChangedInstead(model)
-    for step in [a for a in model.acting if _is_step(a)]:
-        rivals = _rivals(data, found.model, step, built_in)
+    for named in [a for a in model.acting if _is_step(a) or a.effect.grows]:
+        of = _of_step if _is_step(named) else _of_drift
+        rivals = _rivals(data, found.model, of(data, found.model, named, built_in), built_in)
         best = max(rivals, key=lambda one: one.nats, default=None)
         if best is not None and best.nats > -AS_GOOD_NATS:
             found = ChangedInstead(best.less, (*found.hits, best.hit))
@@ -70,19 +75,32 @@ def _is_step(one: Acting) -> bool:
     return located and one.effect.comes_with == "stamps" and one.effect.sensitivity is not None
 
 
-def _rivals(
-    data: Data, model: Model, step: Acting, built_in: Sequence[Signature]
-) -> Iterator[_Rival]:
-    """Of each stretch that a step may be taken for, what is built in and fits best."""
+def _of_drift(
+    data: Data, model: Model, drift: Acting, built_in: Sequence[Signature]
+) -> list[_Place]:
+    """Where something changed once, by what is left without a drift."""
+    kept = tuple(a for a in model.acting if a.label != drift.label)
+    without = replace(model, acting=kept, error=data.error(kept))
+    hit = changed_once(data, without, built_in)
+    return [] if hit is None else [((drift.label,), (hit.from_s, hit.to_s))]
+
+
+def _of_step(data: Data, model: Model, step: Acting, built_in: Sequence[Signature]) -> list[_Place]:
+    """From a step of stamps on; beside a delay of the same sensor, until then as well."""
     time_s = data.view.log.time_s
     at_s = float(time_s[0]) + float(step.values["time_s"])  # of a log its first row is the start
     delay = (plain_delay().name, step.sensor, step.stage)
-    places: list[tuple[tuple[Label, ...], tuple[float, float]]] = [
-        ((step.label,), (at_s, float(time_s[-1])))
-    ]
+    places: list[_Place] = [((step.label,), (at_s, float(time_s[-1])))]
     if delay in model.labels:
         before_s = float(time_s[max(int(np.searchsorted(time_s, at_s)) - 1, 0)])
         places.append(((step.label, delay), (float(time_s[0]), before_s)))
+    return places
+
+
+def _rivals(
+    data: Data, model: Model, places: Sequence[_Place], built_in: Sequence[Signature]
+) -> Iterator[_Rival]:
+    """Of each stretch that something may be taken for, what is built in and fits best."""
     white = precision(data.structure, as_loud(data.structure, model))
     own = _at_best(data, model.acting, white)
     for labels, stretch in places:

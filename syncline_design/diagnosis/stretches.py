@@ -206,6 +206,14 @@ def left_as_one(data: Data, model: Model, known: Sequence[Signature]) -> OneCour
     return one_course([(s.candidate.label, _summed(data, whitened, s)) for s in asked])
 
 
+def changed_once(data: Data, model: Model, asked: Sequence[Signature]) -> Hit | None:
+    """What is built in and changed once, by what a model leaves; None where nothing is clear."""
+    if not asked or len(data.view) < 4 * LEAST_ROWS:
+        return None
+    whitened = _whitened(data, np.zeros((0, len(data.view), 3)), model)
+    return once_changed([(s, _summed(data, whitened, s)) for s in asked])
+
+
 def in_stretches(found: Sequence[Signature]) -> list[Signature]:
     """Those that are asked in stretches."""
     effects = [(s, s.candidate.effect) for s in found if s.plain]
