@@ -38,7 +38,7 @@ def test_components_that_are_left_alike_are_told_together() -> None:
     arm = "lever_arm(position)"
     left = {f"{arm}.x_m": 0.1412, f"{arm}.y_m": 0.1411, f"{arm}.z_m": 0.143,
             "latency(position).latency_s": 0.0973}  # fmt: skip
-    told = plan_sentences._left(SimpleNamespace(tolerance={}), left)  # type: ignore[arg-type]
+    told = plan_sentences._left(left)
     assert told.replace("\u00a0", " ") == (
         "lever arm x and y (position) at 141 mm, lever arm z (position) at 143 mm, "
         "latency (position) at 97.3 ms"

@@ -56,6 +56,7 @@ def test_a_large_latency_is_told_from_a_filter_lag_that_a_small_one_is_like(
         (small, "apart, at the size that is known, in these minutes"),
     ):
         assert done.exit_code == 1
+        assert "Not reachable: no drive of this platform tells it" in " ".join(done.stdout.split())
         assert f"No drive of this platform tells {LATENCY} and {LAG} {words}" in " ".join(
             done.stdout.split()
         )

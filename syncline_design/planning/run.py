@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from syncline_design.machine.deadline import NoVerdict, in_force
@@ -22,6 +23,7 @@ from syncline_design.planning.wanted import (
 from syncline_design.spec.case import Case
 
 LONGEST_S: Final = 4 * 3600.0  # of a drive that is looked for to say the least minutes
+LONGEST_TOLD_S: Final = 168 * 3600.0  # more of the same that takes longer is no answer
 SEARCH_SHARE: Final = 0.5  # of the command's time
 
 
@@ -161,5 +163,5 @@ class _Planning:
         if known:
             return max(min(known), 1.001 * most_s)
         needed = times_needed(self.setup.judge, together(whole.legs))
-        longer_s = None if needed is None else needed * lasting_s(whole.legs)
-        return longer_s if longer_s is not None and longer_s > most_s else None
+        longer_s = math.inf if needed is None else needed * lasting_s(whole.legs)
+        return longer_s if most_s < longer_s <= max(LONGEST_TOLD_S, most_s) else None

@@ -149,8 +149,7 @@ def would_take(confused: Sequence[str]) -> str:
 def _known_otherwise(found: Plan) -> str:
     """What no drive tells from what is asked, with what it leaves of that where it is free."""
     each = [
-        f"{effect_words(one.effect)} (would leave {_left(found, one.sigma)})"
-        for one in found.untold or ()
+        f"{effect_words(one.effect)} (would leave {_left(one.sigma)})" for one in found.untold or ()
     ]
     return (
         "Taken as known, since nothing that can be driven tells them from what is asked, or only "
@@ -159,11 +158,11 @@ def _known_otherwise(found: Plan) -> str:
     )
 
 
-def _left(found: Plan, sigma: Mapping[str, float]) -> str:
+def _left(sigma: Mapping[str, float]) -> str:
     """`lever arm x and y (position) at 141 mm, lever arm z (position) at 143 mm`."""
     alike: dict[tuple[str, str], list[str]] = {}
     for key, value in sigma.items():
-        place = key.rpartition(".")[0], figure(key, value, found.tolerance.get(key))
+        place = key.rpartition(".")[0], figure(key, value)
         alike.setdefault(place, []).append(key)
     parts = []
     for (_, size), keys in alike.items():
