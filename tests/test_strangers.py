@@ -259,6 +259,53 @@ def test_several_changes_of_one_day_are_told_once_each_with_their_uncertainty(
     assert 0.75 < float(np.sqrt(np.mean(np.square(off)))) < 1.2
 
 
+def test_a_weaker_effect_of_the_same_day_is_told_beside_the_first(tmp_path: Path) -> None:
+    """A latency by 40 bounds, and the range bias by 7 with the same run, three runs before it and
+    three from it on: too little to ring by itself, as it may be scatter; that day had a change."""
+    told_too = 0
+    for seed in range(12):
+        rng = np.random.default_rng([23, seed])
+        moved = np.array([40.0, 7.0, 0, 0, 0]) * BOUND
+        runs = [run_of(statistics(rng, moved * (k >= 3)), k) for k in range(6)]
+        entries = tuple(
+            Entry(k + 1, f"#{k + 1}", run, run.statistics(), f"{k:064d}")
+            for k, run in enumerate(runs)
+        )
+        stored = Stored(tmp_path, "car", {}, entries, (), {}, (), 0, "", b"")
+        seen = {s.change.term.label[0]: s for s in ComparedRuns(stored, entries, 3.0).seen}
+        assert "latency" in seen
+        assert set(seen) <= {"latency", "range_bias"}
+        told_too += "range_bias" in seen
+    assert told_too == 12
+
+
+def test_what_would_do_as_well_is_said_of_a_run_and_of_what_scatters(
+    spec: Path, tmp_path: Path
+) -> None:
+    """Latency and the datum's north of cosine 0.995: neither a run by itself nor scatter tells them
+    apart, and the words say so, once for both."""
+    rng = np.random.default_rng(24)
+    moved = np.array([25.0, 0, 0, 0, 0]) * BOUND
+    runs = [run_of(statistics(rng, moved * (k == 5), 0.995), k) for k in range(9)]
+    store = kept(spec, tmp_path, runs)
+    found = told(spec, store, tmp_path, 1)
+    (one,) = found["unlike"]
+    names = {one["effect"], *(other["effect"] for other in one["aliases"])}
+    assert names == {"latency", "datum_offset"}
+    assert found["alarms"][0]["aliases"] == one["aliases"]
+    said = " ".join(watch(store, spec).output.split())
+    assert f"or as well {one['aliases'][0]['effect'].replace('_', ' ')}" in said
+    store.unlink()
+    scattered = rng.standard_normal(12) * 8.0
+    runs = [run_of(statistics(rng, np.array([v, 0, 0, 0, 0]) * BOUND, 0.995), k)
+            for k, v in enumerate(scattered)]  # fmt: skip
+    words = [w for w in told(spec, kept(spec, tmp_path, runs), tmp_path, 0)["cautions"]
+             if "another value in every run" in w]  # fmt: skip
+    assert len(words) == 1
+    assert "latency (position)" in words[0]
+    assert "datum offset (target)" in words[0]
+
+
 def test_a_run_beyond_the_platforms_limits_is_said_until_it_is_left_out(
     spec: Path, tmp_path: Path
 ) -> None:

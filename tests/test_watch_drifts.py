@@ -20,6 +20,7 @@ from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.strangers import share_of
 from syncline_design.campaign.trends import Trend, shapes, trends
 from syncline_design.diagnosis.sufficient import Sufficient
+from syncline_design.effects import registry
 from tests.watched_series import (
     BOUND,
     LABELS,
@@ -144,3 +145,71 @@ def test_a_drift_is_told_by_run_and_by_what_it_came_to(tmp_path: Path) -> None:
     assert f"latency drifts by {shown(alarm['drift']['text'])} a run since run 2" in said
     assert f"{shown(alarm['text'])} by run 9" in said
     assert "another value in every run" not in said
+
+
+def test_runs_that_clearly_differ_are_no_all_clear_before_they_ring(tmp_path: Path) -> None:
+    """Four runs, six bounds apart each: it may be a drift or scatter, and is said to be open; with
+    the next it rings.  The values of an alike series say nothing."""
+    spec = car_spec(tmp_path / "spec.yaml")
+    runs = [run_of(s, k) for k, s in enumerate(drifting(5, 4, 6.0, 1))]
+    store = kept(spec, tmp_path, runs)
+    document = told(spec, store, tmp_path, 0)
+    assert document["unsettled"]["effect"] == "latency"
+    true = float(np.std(6.0 * BOUND[0] * np.arange(4), ddof=1))
+    assert document["unsettled"]["spread"]["latency_s"] == pytest.approx(true, rel=0.3)
+    said = watch(store, spec, "--require-informative")
+    assert said.exit_code == 3
+    assert "? The runs are not all alike: latency (position)" in " ".join(said.output.split())
+    store.unlink()
+    alike = [run_of(s, k) for k, s in enumerate(drifting(5, 4, 0.0, 1))]
+    assert "unsettled" not in told(spec, kept(spec, tmp_path, alike), tmp_path, 0)
+
+
+def test_no_run_of_a_drift_is_unlike_the_others(tmp_path: Path) -> None:
+    """The second run of nine lies on the line that all draw, far from most of them."""
+    spec = car_spec(tmp_path / "spec.yaml")
+    for seed in range(4):
+        runs = [run_of(s, k) for k, s in enumerate(drifting(seed, 7, 6.0, 1))]
+        document = told(spec, kept(spec, tmp_path, runs), tmp_path, 1)
+        assert "unlike" not in document
+        (alarm,) = document["alarms"]
+        assert (alarm["since"]["run"], alarm["since"]["low"]) == (2, 2)
+        (tmp_path / "store.jsonl").unlink()
+
+
+def test_not_knowing_when_a_drift_began_is_in_what_it_came_to() -> None:
+    """A drift of one bound a run, its first run known to one or two: what it came to by the last
+    run is told with an error that scatters by one of its uncertainty."""
+    off = []
+    for seed in range(30):
+        runs = drifting(100 + seed, 9, 1.2, 4)
+        for one in (s for s in seen_in(runs) if s.change.term.label[0] == "latency"):
+            grown = float(one.change.trend.over(9)[-1])
+            spread = (grown**2 * one.change.covariance + one.dating_now)[0, 0] ** 0.5
+            off.append((grown * one.change.values[0] - 6.0 * BOUND[0]) / spread)
+            assert one.dating_now[0, 0] >= 0.0
+    assert len(off) >= 20
+    assert float(np.sqrt(np.mean(np.square(off)))) < 1.3
+    assert sum(abs(z) > 2.5 for z in off) <= 2  # 1.2 % each
+
+
+def test_of_a_boresight_about_one_axis_no_single_angle_is_told() -> None:
+    """Two effects that move the runs alike, one of three values of which one moved and one of one:
+    the commoner is told, and the other is an alias, whatever a prior's width makes of three."""
+    bore = [p.name for p in registry()["boresight"].slopes()]
+    (azimuth,) = [p.name for p in registry()["azimuth_bias"].slopes()]
+    labels = tuple(("boresight", "ranging", 0, name) for name in bore)
+    labels = (*labels, ("azimuth_bias", "ranging", 0, azimuth))
+    rng = np.random.default_rng(66)
+    runs = []
+    for k in range(9):
+        columns = rng.standard_normal((64, 3))
+        columns = np.column_stack([columns, columns[:, 2]]) / 1e-4
+        y = columns[:, 2] * 4e-5 * max(k - 1, 0) + rng.standard_normal(64)
+        normal = columns.T @ columns
+        runs.append(Sufficient(labels, normal, columns.T @ y, float(y @ y), normal / 64.0, ()))
+    changes = Changes(pool_of(runs, range(9)))
+    best = changes.gains(9).max(axis=0)
+    names = [term.label[0] for term in changes.terms]
+    worse = best[names.index("azimuth_bias")] - best[names.index("boresight")]
+    assert worse < 2.0  # within what the commoner of two is told by

@@ -32,15 +32,21 @@ e-processes; Shin, Ramdas, Rinaldo, New England J. Stat. Data Sci. 2 (2024), on 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
 from syncline_design.campaign.differing import clearly_differing
+from syncline_design.campaign.freed_runs import (
+    freed_by_trends,
+    marginal,
+    pseudo_inverse,
+    with_beside,
+)
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Pool, Term, inverted
 from syncline_design.campaign.run_records import Change, Differing, Freed, Runs, SameSize
@@ -53,7 +59,7 @@ from syncline_design.campaign.scatter import (
     log_odds_apart,
     scattered,
 )
-from syncline_design.campaign.trends import Trend, later, log_weights, shapes, trends
+from syncline_design.campaign.trends import Trend, later, log_weights, trends
 from syncline_design.campaign.within_runs import scatter_within
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
@@ -134,13 +140,36 @@ class Changes:
         found: Array = log_weights(look)[:, None] + self._factors(freed, runs, self.inside(look))
         return found + self.log_weights
 
+    def _noise(self, look: int) -> float:
+        """Variance inside runs by the effect that is likeliest by the noise fitted."""
+        first = self._factors(self._freed(look), self.compared(look), np.ones(len(self.terms)))
+        return float(self.inside(look)[int(np.argmax(first)) % len(self.terms)])
+
     def likelihoods(self, look: int) -> Array:
         """The same by one noise for all effects, that of the likeliest, so that they compare."""
-        runs, freed = self.compared(look), self._freed(look)
-        first = self._factors(freed, runs, np.ones(len(self.terms)))
-        noise = self.inside(look)[int(np.argmax(first)) % len(self.terms)]
+        runs, freed, noise = self.compared(look), self._freed(look), self._noise(look)
         found: Array = log_weights(look)[:, None] + self.log_weights
         return found + self._factors(freed, runs, np.full(len(self.terms), noise))
+
+    def gains(self, look: int) -> Array:
+        """What every course and effect explains by one noise for all, less a nat a value, and the
+        logs of their weights, (2 (look - 1), C).
+
+        By its width a prior prefers the fewer values, so that of a boresight about one axis the
+        azimuth's bias alone would be told: 3 nat for every angle that stayed where it was.
+        """
+        freed, noise = self._freed(look), self._noise(look)
+        found = np.zeros((2 * (look - 1), len(self.terms)))
+        for group, normal, score in zip(self.groups, freed.normals, freed.scores, strict=True):
+            square = np.einsum("kga,kgab,kgb->kg", score, inverted(normal), score)
+            found[:, group.terms] = 0.5 * square / noise - group.index.shape[1]
+        return np.asarray(found + log_weights(look)[:, None] + self.log_weights)
+
+    def of_one_day(self, look: int, rows: Sequence[int]) -> float:
+        """log of the mean Bayes factor of any effect by some courses, which a change has that was
+        told: that something happened then is known, and no date or scatter is held against it."""
+        factors = self._factors(self._freed(look), self.compared(look), self.inside(look))
+        return float(np.max(np.logaddexp.reduce(factors[list(rows)] + self.log_weights, axis=1)))
 
     def doubt(self, look: int) -> float:
         """log (1 + sum p_a L_a): how much likelier the first runs are where some effect may differ
@@ -232,23 +261,10 @@ class Changes:
     def _freed(self, look: int) -> Freed:
         """N and s of every course, by the first `look` runs."""
         if look not in self._last:
-            found = self._freed_of(self.compared(look))
+            found = freed_by_trends(self.compared(look), self.groups)
             self._last.clear()
             self._last[look] = found
         return self._last[look]
-
-    def _freed_of(self, runs: Runs) -> Freed:
-        """The same of some runs, what differs from one to the next freed in them."""
-        over = shapes(len(runs.normal))
-        summed = np.tensordot(over, runs.normal, axes=1)
-        cross = summed @ runs.inverse
-        scores = over @ runs.score - cross @ runs.score.sum(axis=0)
-        normals = []
-        for g in self.groups:
-            own = np.tensordot(np.square(over), runs.normal[:, *g.blocks], axes=1)
-            taken = cross[:, g.index] @ np.swapaxes(summed[:, g.index], -1, -2)
-            normals.append(own - taken)
-        return Freed(tuple(normals), tuple(scores[:, g.index] for g in self.groups))
 
     def temper(self, look: int) -> Array:
         """Variance over that fitted, of every course and effect: inside runs, and between them."""
@@ -286,20 +302,28 @@ class Changes:
         runs alike.
         """
         if look not in self._latest:
-            found = self._compared(look, *self._side_by_side(look))
+            found = self._compared(look, *with_beside(self.pool, look, self.beside))
+            whole = found.scatters
             likely = self._likeliest_of(look, found) if look > 2 else None
             if likely is not None:
                 found = self._compared(look, found.normal, found.score, likely)
             for _ in range(MOST_SCATTERED):
-                one = clearly_differing(self.terms, self.groups, found)
+                one = clearly_differing(self.terms, self.groups, found.normal, found.scatters)
                 if one is None:
                     break
                 freed = (*found.freed, one)
                 own = freed_of(found.normal, found.score, one.term.index, one.covariance)
                 found = replace(self._compared(look, *own, likely), freed=freed)
             self._latest.clear()
-            self._latest[look] = found
+            self._latest[look] = replace(found, whole=whole)
         return self._latest[look]
+
+    def apart(self, look: int) -> Differing | None:
+        """The effect in which the first `look` runs most clearly are not all alike, by whatever
+        change or scatter; None where noise would do."""
+        runs = self.compared(look)
+        every = [replace(one, square=one.square[-1:], free=one.free[-1:]) for one in runs.whole]
+        return clearly_differing(self.terms, self.groups, runs.normal, every)
 
     def likeliest(self, look: int) -> Change | None:
         """The likeliest change by the first `look` runs and the noise fitted; None where none is
@@ -307,22 +331,10 @@ class Changes:
         return self._likeliest_of(look, self.compared(look))
 
     def _likeliest_of(self, look: int, runs: Runs) -> Change | None:
-        freed = self._freed_of(runs)
+        freed = freed_by_trends(runs, self.groups)
         table = self._weighted(look, freed, runs)
         row, c = np.unravel_index(int(np.argmax(table)), table.shape)
         return self._fitted(look, freed, int(row), int(c)) if table[row, c] > 0.0 else None
-
-    def _side_by_side(self, look: int) -> tuple[Array, Array]:
-        """Information and score of the first runs, what is beside as parameters after all others:
-        of a change of course h they have h times the columns of its effect."""
-        normal, score = self.pool.normal[:look], self.pool.score[:look]
-        if not self.beside:
-            return normal, score
-        index = np.concatenate([np.arange(score.shape[1]), *(b.term.index for b in self.beside)])
-        over = [np.repeat(b.trend.over(look)[:, None], b.term.size, axis=1) for b in self.beside]
-        grown: Array = np.concatenate([np.ones_like(score), *over], axis=1)
-        squares = grown[:, :, None] * grown[:, None, :]
-        return normal[:, index[:, None], index] * squares, score[:, index] * grown
 
     def differing(self, look: int) -> tuple[Differing, ...]:
         """Effects that clearly differ from run to run, of the first `look` runs."""
@@ -353,7 +365,7 @@ class Changes:
     def total(self, look: int, normal: Array, score: Array) -> Array:
         """Information of runs, with the prior of what they show; what is beside is free."""
         found, size = normal.sum(axis=0), len(self.pool.labels)
-        total, scores = _marginal(found, score.sum(axis=0), size)
+        total, scores = marginal(found, score.sum(axis=0), size)
         prior, held = np.diag(found)[:size] / PLAUSIBLE**2, np.zeros_like(total)
         groups = tuple((g.terms, g.index) for g in self.groups)
         for one in shown_constants(total, scores, groups, self.inside(look)):
@@ -382,20 +394,3 @@ class Changes:
         found = Changes(pool, (), beside)
         found.__dict__["within"] = self.within  # the scatter inside runs is what it was
         return found
-
-
-def _marginal(total: Array, score: Array, size: int) -> tuple[Array, Array]:
-    """The first so many parameters, the others free."""
-    if len(total) == size:
-        return total, score
-    across = total[:size, size:] @ inverted(total[size:, size:])
-    left: Array = score[:size] - across @ score[size:]
-    return total[:size, :size] - across @ total[size:, :size], left
-
-
-def pseudo_inverse(total: Array) -> Array:
-    """total^-1 (..., P, P), columns scaled alike first."""
-    scale = column_sizes(np.diagonal(total, axis1=-2, axis2=-1))
-    squares = scale[..., :, None] * scale[..., None, :]
-    found: Array = np.linalg.pinv(total / squares, hermitian=True, rcond=1e-13) / squares
-    return found

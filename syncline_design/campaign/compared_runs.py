@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Final
@@ -28,7 +28,11 @@ CREDIBLE: Final = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A change that was seen: the best, at which look first, how sure, what else it could be."""
+    """A change that was seen: the best, at which look first, how sure, what else it could be.
+
+    dating, dating_now: covariances (p, p) of its values by not knowing the first run that has it,
+    and of what it came to by the last run, by not knowing whether it is a step or a drift either.
+    """
 
     change: Change
     low: int
@@ -36,6 +40,8 @@ class Seen:
     first_look: int
     log_evidence: float
     others: tuple[tuple[Term, float], ...]
+    dating: Array
+    dating_now: Array
 
     def grown(self, values: Array) -> Seen:
         """The same, by so much larger."""
@@ -120,13 +126,16 @@ class ComparedRuns:
         changes, look = self.changes, len(self.runs)
         for _ in range(2 * MOST_CHANGES):
             at = look
-            total = changes.log_evidence(at)[0]
+            total, rows = changes.log_evidence(at)[0], None
+            if found and total < self.threshold:
+                rows = _rows_of(found, at)
+                total = changes.of_one_day(at, rows)
             if found and (total < self.threshold or len(found) == MOST_CHANGES):
                 break
             if not found and total < math.log(2.0):  # it went back, which is a change of its own
                 at = first
                 total = changes.log_evidence(at)[0]
-            one = _best(changes, at, first, total)
+            one = _best(changes, at, first, total, rows)
             changes = changes.taking(one.change)
             same = [k for k, other in enumerate(found) if other.change.is_of(one.change)]
             for k in same:  # what was left of one that is told already
@@ -205,14 +214,25 @@ def _fitted_together(changes: Changes, ones: Sequence[Change], look: int) -> lis
     return found
 
 
-def _best(changes: Changes, look: int, first: int, total: float) -> Seen:
-    """The likeliest change; among effects that are as good, the commonest in practice."""
-    table = changes.likelihoods(look)
-    each = np.logaddexp.reduce(table, axis=0)
+def _rows_of(found: Sequence[Seen], look: int) -> list[int]:
+    """Places of the courses that changes have."""
+    known = trends(look)
+    return sorted({known.index(one.change.trend) for one in found})
+
+
+def _best(
+    changes: Changes, look: int, first: int, total: float, rows: Sequence[int] | None
+) -> Seen:
+    """The likeliest change; among effects that are as good, the commonest in practice.  rows: the
+    courses that it may have, None: any."""
+    may = np.full((2 * (look - 1), 1), 0.0 if rows is None else -np.inf)
+    may[list(rows or ())] = 0.0
+    table = changes.likelihoods(look) + may
+    each = np.logaddexp.reduce(changes.gains(look) + may, axis=0)
     close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
     c = min(close, key=lambda i: (commonness(changes.terms[i].label), -each[i]))
     known = trends(look)
-    share = np.exp(table[:, c] - each[c])
+    share = np.exp(table[:, c] - np.logaddexp.reduce(table[:, c]))
     kinds = np.array([one.kind for one in known])
     kind = max(dict.fromkeys(kinds), key=lambda one: float(share[kinds == one].sum()))
     row = int(np.argmax(np.where(kinds == kind, share, -1.0)))
@@ -224,8 +244,21 @@ def _best(changes: Changes, look: int, first: int, total: float) -> Seen:
          if i != c and each[i] > each[c] - RIVAL_NATS),
         key=lambda other: other[1],
     )  # fmt: skip
-    return Seen(changes.change(look, row, int(c)), min(credible), max(credible), first,
-                total, tuple(others))  # fmt: skip
+    best = changes.change(look, row, int(c))
+    near = [(changes.change(look, int(k), int(c)), float(share[k])) for k in order[:needed]]
+    same = [(one, own) for one, own in near if one.trend.kind == kind]
+    apart = (_apart(best, same, lambda one: 1.0),
+             _apart(best, near, lambda one: float(one.trend.over(look)[-1])))  # fmt: skip
+    return Seen(best, min(credible), max(credible), first, total, tuple(others), *apart)
+
+
+def _apart(
+    best: Change, near: Sequence[tuple[Change, float]], grown: Callable[[Change], float]
+) -> Array:
+    """Covariance (p, p) about the best of values, grown as they are, of changes by their shares."""
+    values = np.array([grown(one) * one.values for one, _ in near]) - grown(best) * best.values
+    shares = np.array([share for _, share in near])
+    return np.asarray(values.T @ (values * shares[:, None]) / shares.sum())
 
 
 def _look(key: str, evidence: float, within: Array, between: Array) -> KeptLook:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from syncline_design.campaign.changes import Changes
-from syncline_design.campaign.run_records import Change
+from syncline_design.campaign.pool import Term
+from syncline_design.campaign.run_records import Change, Differing
 from syncline_design.campaign.store import Entry
 from syncline_design.campaign.strangers import share_of
+from syncline_design.campaign.watch_result import Unsettled
 from syncline_design.diagnosis.finding import texts_of
 from syncline_design.diagnosis.result import UnlikeOthers
+from syncline_design.effects import registry
+from syncline_design.effects.record import Effect
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.figure_text import (
     format_chance,
@@ -38,12 +42,14 @@ def cautions(
     changes: Changes,
     seen: Sequence[Change],
     stage: Callable[[int], str],
+    unsettled: Unsettled | None,
 ) -> Iterator[str]:
     """In sentences without their full stop.
 
     runs: of the last baseline, in the order in which they are compared; doubted: the run after
     which a kept look says what its runs do not; unlike: runs that are unlike the others; changes:
-    of those that are compared; seen: changes that are alarms; stage: names of stages.
+    of those that are compared; seen: changes that are alarms; stage: names of stages; unsettled:
+    where they differ and nobody knows how.
     """
     if not runs:
         return
@@ -57,7 +63,10 @@ def cautions(
     yield from _of_the_last(runs)
     yield from _undated(runs)
     yield from _dated_long_before(runs)
-    yield from _differing(changes, seen, changes.pool.count, stage)
+    for found in scattering(changes, seen, changes.pool.count):
+        yield _differing(found, stage)
+    if unsettled is not None:
+        yield _not_settled(unsettled)
 
 
 def _contradicted(runs: Sequence[Entry]) -> Iterator[str]:
@@ -92,9 +101,11 @@ def departure_words(one: UnlikeOthers) -> str:
     alone = len(one.differs) == 1
     parts = [("" if alone else f"{split_suffix(name)[0].replace('_', ' ')} ") + f"by {texts[name]}"
              for name, own in one.differs.items() if own.seen]  # fmt: skip
+    others = [f"{o.effect.replace('_', ' ')} ({o.sensor})" for o in one.aliases or ()]
+    may = f", or as well {sentence_list(others, 'or')}" if others else ""
     return (
         f"{one.effect.replace('_', ' ')} ({one.sensor}){' ' if alone else ', '}"
-        f"{sentence_list(parts)} (chance by noise alone {format_chance(one.log10_chance)})"
+        f"{sentence_list(parts)} (chance by noise alone {format_chance(one.log10_chance)}{may})"
     )
 
 
@@ -165,23 +176,64 @@ def _dated_long_before(runs: Sequence[Entry]) -> Iterator[str]:
             )
 
 
-def _differing(
-    changes: Changes, seen: Sequence[Change], look: int, stage: Callable[[int], str]
-) -> Iterator[str]:
+def scattering(changes: Changes, seen: Sequence[Change], look: int) -> Iterator[Differing]:
     """Effects that have another value in every run: no change, and nothing to count on."""
     changes = changes.without(*seen)  # what moves along with a change is told by it
     told = {one.term.label for one in seen}
     for found in changes.differing(look):
-        term = found.named
-        if term.label in told or found.log_p > math.log(DIFFERS * share_of(look)):
-            continue
-        sizes = " and ".join(
-            format_estimate(float(to_digits(float(size), 2)), None, one.unit)
-            for size, one in zip(found.spread, term.effect.slopes(), strict=True)
-        )
-        words = f"{term.effect.name.replace('_', ' ')} ({term.sensor})"
-        yield (
-            f"{words} of {stage(term.stage)} "
-            f"has another value in every run: they differ by {sizes} (standard deviation) more "
-            "than noise, which is no change since a run, and no one value of the build"
-        )
+        if found.named.label not in told and _beyond_noise(found, look):
+            told.add(found.named.label)  # two that move the runs alike have one name
+            yield found
+
+
+def unsettled_in(changes: Changes, look: int, stage: Callable[[int], str]) -> Unsettled | None:
+    """Where runs in which nothing rang and nothing is said to scatter are not all alike."""
+    found = changes.apart(look)
+    if found is None or not _beyond_noise(found, look) or any(scattering(changes, (), look)):
+        return None
+    name, sensor, place = found.named.label
+    names = [p.name for p in found.named.effect.slopes()]
+    sizes = dict(zip(names, map(float, found.spread), strict=True))
+    return Unsettled(name, sensor, stage(place), sizes, found.log_p / math.log(10.0))
+
+
+def _beyond_noise(found: Differing, look: int) -> bool:
+    return found.log_p <= math.log(DIFFERS * share_of(look))
+
+
+def _differing(found: Differing, stage: Callable[[int], str]) -> str:
+    term = found.named
+    named = dict(zip([p.name for p in term.effect.slopes()], found.spread, strict=True))
+    return (
+        f"{term.effect.name.replace('_', ' ')} ({term.sensor}) of {stage(term.stage)} "
+        f"has another value in every run: they differ by {_sizes(term.effect, named)} (standard "
+        "deviation) more than noise, which is no change since a run, and no one value of the build"
+        f"{_or_else(found.others)}"
+    )
+
+
+def _or_else(others: Sequence[Term]) -> str:
+    """`; it may be lever arm (position) as well, which moves the runs alike`."""
+    names = [f"{one.effect.name.replace('_', ' ')} ({one.sensor})" for one in others]
+    if not names:
+        return ""
+    return f"; it may be {sentence_list(names, 'or')} as well, by what the runs tell"
+
+
+def _not_settled(one: Unsettled) -> str:
+    sizes = _sizes(registry()[one.effect], one.spread)
+    return (
+        f"the runs are not all alike: {one.effect.replace('_', ' ')} ({one.sensor}) of {one.stage} "
+        f"differs by {sizes} (standard deviation) more than noise (chance by noise alone "
+        f"{format_chance(one.log10_chance)}); whether that is a change, a drift or another value "
+        "in every run, the next runs will tell"
+    )
+
+
+def _sizes(effect: Effect, spread: Mapping[str, float]) -> str:
+    """`5.2 mm and 6 mm`."""
+    units = {p.name: p.unit for p in effect.slopes()}
+    return " and ".join(
+        format_estimate(float(to_digits(float(size), 2)), None, units[name])
+        for name, size in spread.items()
+    )

@@ -49,13 +49,15 @@ class SameSize:
 class Differing:
     """An effect that differs from run to run, and the covariance (p, p) by which it does beyond
     noise; named, named_covariance: the same of the commonest that differs as clearly.  log_p: log
-    of the chance that the named one differs so much by noise alone, all effects counted."""
+    of the chance that the named one differs so much by noise alone, all effects counted.  others:
+    what would explain most of that as well."""
 
     term: Term
     covariance: Array
     named: Term
     named_covariance: Array
     log_p: float
+    others: tuple[Term, ...] = ()
 
     @property
     def spread(self) -> Array:
@@ -77,7 +79,8 @@ class Runs:
     """Information and score of runs, their sum with the prior and its inverse, and the scatter of
     each effect.
 
-    freed: what clearly differs from run to run.
+    freed: what clearly differs from run to run.  whole: the scatter before any change was taken
+    off or effect freed.
     """
 
     normal: Array
@@ -86,3 +89,4 @@ class Runs:
     inverse: Array
     scatters: tuple[RunScatter, ...]
     freed: tuple[Differing, ...] = ()
+    whole: tuple[RunScatter, ...] = ()

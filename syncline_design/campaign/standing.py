@@ -21,7 +21,8 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Changes, pseudo_inverse
+from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.freed_runs import pseudo_inverse
 from syncline_design.campaign.pool import Index, inverted
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.strangers import Departure, Stranger, departures_of, limit_of, part_of
@@ -63,9 +64,10 @@ def standing(changes: Changes, strange: Sequence[Stranger]) -> StandingAlone:
         spans = [_explaining(left, int(np.flatnonzero(rows == one.run)[0]), one) for one in still]
         span = max(spans, key=lambda one: one.gain)
         change = _changed(left)
-        as_change = change is not None and _explained(change) > span.gain
+        as_change = change is not None and _explained(left, change) > span.gain
         ends = (change.k, len(rows)) if change is not None and as_change else (span.first, span.end)
-        lone = _lone(ends, len(rows))
+        drifts = change is not None and as_change and change.trend.kind == "drift"
+        lone = None if drifts else _lone(ends, len(rows))
         one = None if lone is None else next((s for s in still if s.run == rows[lone]), None)
         if one is not None and lone is not None:
             kept.append(one)
@@ -95,9 +97,15 @@ def _changed(changes: Changes) -> Change | None:
     return changes.likeliest(changes.pool.count)
 
 
-def _explained(change: Change) -> float:
+def _explained(changes: Changes, change: Change) -> float:
     """What a change explains [nat], by the noise fitted, as spans do."""
-    return 0.5 * float(change.values @ inverted(change.covariance) @ change.values)
+    pool, index = changes.pool, change.term.index
+    over = change.trend.over(pool.count)
+    across = np.tensordot(over, pool.normal[:, index], axes=1)
+    kept = across @ pseudo_inverse(changes.total(pool.count, pool.normal, pool.score))
+    own = np.tensordot(np.square(over), pool.normal[:, index[:, None], index], axes=1)
+    score = over @ pool.score[:, index] - kept @ pool.score.sum(axis=0)
+    return 0.5 * float(score @ inverted(own - kept @ across.T) @ score)
 
 
 def _explaining(changes: Changes, at: int, one: Stranger) -> Span:

@@ -27,8 +27,9 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.changes import Changes, pseudo_inverse
+from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.constants import Apart, apart_of, held_of
+from syncline_design.campaign.freed_runs import pseudo_inverse
 from syncline_design.campaign.pool import Index, Term, inverted
 from syncline_design.campaign.run_records import Runs
 from syncline_design.campaign.scatter import APART, freed_of
@@ -46,6 +47,7 @@ PAIRED: Final = 3  # of them, of which two are looked at together
 FEWEST_OF_PAIRS: Final = 6  # runs
 SCATTER_KNOWN: Final = 8  # runs; before, an effect is taken to differ by APART from run to run
 AS_GOOD_NATS: Final = 2.0
+RIVAL_NATS: Final = 3.0
 
 
 def share_of(look: int) -> float:
@@ -55,11 +57,13 @@ def share_of(look: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Departure:
-    """One effect by which a run differs from the others: by how much, and log of the chance."""
+    """One effect by which a run differs from the others: by how much, log of the chance, and what
+    would explain that as well in its place, by how many nats less."""
 
     term: Term
     judged: Judged
     log_p: float
+    others: tuple[tuple[Term, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,7 +305,24 @@ class Odd:
             own = slice(at, at + term.size)
             at += term.size
             judged = Judged(values[own], float(self.temper[k]) * covariance[own, own])
-            yield Departure(term, judged, self.log_p(k, [b for b in stay if b != k], limit))
+            beside = [b for b in stay if b != k]
+            others = tuple(self._others(k, beside))
+            yield Departure(term, judged, self.log_p(k, beside, limit), others)
+
+    def _others(self, k: int, beside: Sequence[int]) -> Iterator[tuple[Term, float]]:
+        """Effects that explain what one does, beside those of others, as well."""
+        terms = self.changes.terms
+        places = [c for c in range(len(terms)) if c not in beside]
+        gains = self._gains(places, beside)
+        for c in sorted(places, key=lambda c: -gains[c]):
+            if c != k and gains[c] >= gains[k] - RIVAL_NATS:
+                yield terms[c], gains[k] - gains[c]
+
+    def _gains(self, places: Sequence[int], beside: Sequence[int]) -> dict[int, float]:
+        """What effects explain beside others, less a nat a value, by one noise: a run has one."""
+        more = {k: self._more(self.known.alike, k, beside)[0] for k in places}
+        noise = float(self.inside[max(places, key=more.__getitem__)])
+        return {k: 0.5 * more[k] / noise - self.changes.terms[k].size for k in places}
 
     def _next(self, taken: Sequence[int], limit: float) -> int | None:
         chances = {k: self.log_p(k, taken, limit) for k in range(len(self.changes.terms))
@@ -309,9 +330,7 @@ class Odd:
         odd = [k for k, chance in chances.items() if chance < limit]
         if not odd:
             return None
-        more = {k: self._more(self.known.alike, k, taken)[0] for k in odd}
-        noise = float(self.inside[max(odd, key=more.__getitem__)])  # one for all: a run has one
-        gains = {k: 0.5 * more[k] / noise - self.changes.terms[k].size for k in odd}
+        gains = self._gains(odd, taken)
         most = max(gains.values())
         close = [k for k in odd if gains[k] >= most - AS_GOOD_NATS]
         return min(close, key=lambda k: (commonness(self.changes.terms[k].label), chances[k]))

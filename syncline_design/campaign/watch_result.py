@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Final, Literal
 
 from syncline_design.diagnosis.result import (
@@ -9,6 +10,7 @@ from syncline_design.diagnosis.result import (
     Check,
     Informative,
     LogOutcome,
+    Other,
     SpecRead,
     UnlikeOthers,
 )
@@ -83,16 +85,6 @@ class Since(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Other(Record):
-    """Another effect whose change explains the runs as well; nats_worse: by how much less."""
-
-    effect: str
-    sensor: str
-    stage: str
-    nats_worse: float
-
-
-@dataclass(frozen=True, slots=True)
 class Drift(Record):
     """A parameter that is another with every run: by how much from one to the next, in SI; by_run:
     the last run, by which it came to the whole change."""
@@ -133,6 +125,22 @@ class Alarm(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Unsettled(Record):
+    """An effect in which the runs are not all alike, where it is not clear yet whether by a change,
+    by a drift or by another value in every run.
+
+    spread: standard deviation beyond noise by parameter, in SI.  log10_chance: of so much by noise
+    alone, over all effects.
+    """
+
+    effect: str
+    sensor: str
+    stage: str
+    spread: Mapping[str, float]
+    log10_chance: float
+
+
+@dataclass(frozen=True, slots=True)
 class WatchRule(Record):
     """How an alarm is raised: at this e-value, with this chance of a false one over all looks."""
 
@@ -161,6 +169,7 @@ class Watch(Record):
     informative: whether the last run could have shown a change that would turn the verdict.
     unlike: runs that are unlike all the others, each with every effect in which it is, the clearest
     first; unlike_rate: the chance that any of several alike runs is said to be, over all looks.
+    unsettled: where nothing rang, and the runs are not all alike yet.
     """
 
     schema: Annotated[str, SchemaName(SCHEMA)] = SCHEMA
@@ -180,6 +189,7 @@ class Watch(Record):
     informative: Informative
     unlike: tuple[UnlikeOthers, ...] | None = optional()
     unlike_rate: float | None = optional()
+    unsettled: Unsettled | None = optional()
 
     @property
     def contradicted(self) -> tuple[WatchedRun, ...]:
@@ -194,7 +204,8 @@ class Watch(Record):
 
     def demanded_exit_code(self, *, informative: bool) -> int:
         """The exit code; 3 where nothing changed in runs of which the last could not show it, or
-        of which one does not belong to the others."""
-        bears_out = self.informative.ok and not self.unlike and not self.contradicted
+        of which one does not belong to the others or that differ."""
+        alike = not self.unlike and self.unsettled is None
+        bears_out = self.informative.ok and alike and not self.contradicted
         hidden = informative and not self.alarms and not bears_out
         return NOT_SHOWN if hidden else self.exit_code

@@ -13,10 +13,11 @@ import numpy as np
 
 from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
+from syncline_design.campaign.alarms import alarms_of, others_of, since_of
 from syncline_design.campaign.compared_runs import ComparedRuns, Seen
 from syncline_design.campaign.joint import JointError
 from syncline_design.campaign.looks import KeptLook
-from syncline_design.campaign.oddities import cautions
+from syncline_design.campaign.oddities import cautions, unsettled_in
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.run_values import RunParameter, run_values
 from syncline_design.campaign.sight import sight
@@ -41,25 +42,20 @@ from syncline_design.campaign.telling import estimates
 from syncline_design.campaign.trends import Trend
 from syncline_design.campaign.watch_result import (
     Alarm,
-    Drift,
-    Other,
     RunValue,
-    Since,
+    Unsettled,
     Watch,
     WatchedRun,
     WatchProvenance,
     WatchRule,
-    e_value_text,
 )
 from syncline_design.diagnosis.consequence import promise_of
-from syncline_design.diagnosis.finding import estimate
 from syncline_design.diagnosis.result import SpecRead, UnlikeOthers
 from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_digits
 from syncline_design.model.normal import NORMAL_95
 from syncline_design.spec.case import Case
 
@@ -222,12 +218,15 @@ class Watching:
     def told(self, torn: int) -> Watch:
         """All of it as a result."""
         stored, case = self.stored, self.case
-        alarms = [a for one in self.rest.seen for a in self._alarms(one)]
+        alarms = [a for one in self.rest.seen for a in self._alarms(one, self.rest)]
         alarms += [] if alarms else self._alone_alarms()
         alarms += self._conventions()
         dated = all(e.run.date is not None for e in self.ordered)
         evidence, unlike = self.rest.evidence, tuple(self._unlike())
         last = float(evidence[-1]) if len(evidence) else None
+        count = len(self.rest.runs)
+        open_yet = not alarms and count > 1 and not unlike
+        unsettled = unsettled_in(self.rest.changes, count, self._stage) if open_yet else None
         return Watch(
             verdict="alarm" if alarms else "unchanged",
             spec=SpecRead(case.spec.name, str(case.path)),
@@ -239,18 +238,23 @@ class Watching:
                            max(len(self.ordered) - 1, 0)),
             baseline_after=stored.baselines[-1] if stored.baselines else 0,
             ordered_by="date" if dated else "adding",
-            cautions=self._cautions(unlike),
+            cautions=self._cautions(unlike, unsettled),
             informative=sight(case, self.rest.changes, len(self.rest.runs), self.request.rate),
             last=stored.last,
             torn=torn,
             provenance=WatchProvenance(__version__, case.spec_sha256, case.catalogs_sha256),
             unlike=unlike or None,
             unlike_rate=STRANGER_RATE if unlike else None,
+            unsettled=unsettled,
         )  # fmt: skip
 
-    def _cautions(self, unlike: Sequence[UnlikeOthers]) -> tuple[str, ...]:
+    def _cautions(
+        self, unlike: Sequence[UnlikeOthers], unsettled: Unsettled | None
+    ) -> tuple[str, ...]:
         seen = [one.change for one in self.rest.seen]
-        odd = cautions(self.ordered, self.doubted, unlike, self.rest.changes, seen, self._stage)
+        odd = cautions(
+            self.ordered, self.doubted, unlike, self.rest.changes, seen, self._stage, unsettled
+        )
         return (*self.stored.left_out_words(), *odd)
 
     def _unlike(self) -> Iterator[UnlikeOthers]:
@@ -264,6 +268,7 @@ class Watching:
                 yield UnlikeOthers(
                     entry.number, entry.run.files, name, sensor, self._stage(stage),
                     estimates(one.term, one.judged), one.log_p / math.log(10.0),
+                    others_of(one.others, self._stage) or None,
                 )  # fmt: skip
 
     def _is_explained(self, stranger: Stranger) -> bool:
@@ -285,49 +290,17 @@ class Watching:
             for departure in one.departures:
                 change = Change(departure.term, Trend("step", one.run), departure.judged.values,
                                 departure.judged.model, evidence)  # fmt: skip
-                seen = Seen(change, one.run, one.run, first, evidence, ())
+                known = np.zeros_like(change.covariance)
+                seen = Seen(change, one.run, one.run, first, evidence, departure.others,
+                            known, known)  # fmt: skip
                 found = self._alarms(seen, self.every)
                 yield from (replace(alarm, alone=True) for alarm in found)
 
     def _stage(self, index: int) -> str:
         return self.case.spec.stages[index].name
 
-    def _alarms(self, one: Seen, course: ComparedRuns | None = None) -> Iterator[Alarm]:
-        """An alarm for each parameter of an effect that clearly changed; at least the clearest.  Of
-        a drift, the change is what it came to by the last run."""
-        runs = (course or self.rest).runs
-        grown = float(one.change.trend.over(len(runs))[-1])
-        change, term = one.change, one.change.term
-        slopes = term.effect.slopes()
-        spread = np.sqrt(np.maximum(np.diag(change.covariance), 0.0))
-        size = np.abs(change.values) / np.where(spread > 0.0, spread, np.inf)
-        others = tuple(Other(*t.label[:2], self._stage(t.stage), worse) for t, worse in one.others)
-        for k in np.argsort(-size):
-            if size[k] < SHOWN and k != np.argmax(size):
-                continue
-            each, own = float(change.values[k]), float(spread[k])
-            value, sigma, unit = grown * each, grown * own, slopes[k].unit
-            half = NORMAL_95 * sigma
-            e_value = math.exp(min(one.log_evidence, 690.0))
-            alarm_from = f"alarm from {to_digits(1.0 / self.request.rate, 3)} on"
-            yield Alarm(
-                effect=term.effect.name,
-                sensor=term.sensor,
-                stage=self._stage(term.stage),
-                parameter=slopes[k].name,
-                change=value,
-                standard_uncertainty=sigma,
-                interval95=(value - half, value + half),
-                unit=unit,
-                text=estimate(value, sigma, unit).text,
-                since=_since(runs, change.k, one.low, one.high),
-                evidence=f"e-value {e_value_text(e_value)}, {alarm_from}",
-                e_value=e_value,
-                first_run=runs[one.first_look - 1].number,
-                aliases=others,
-                drift=Drift(each, own, estimate(each, own, unit).text, runs[-1].number)
-                if change.trend.kind == "drift" else None,
-            )  # fmt: skip
+    def _alarms(self, one: Seen, course: ComparedRuns) -> Iterator[Alarm]:
+        return alarms_of(one, course.runs, self._stage, self.request.rate)
 
     def _conventions(self) -> Iterator[Alarm]:
         """Conventions and slips that were undone in some runs and not in the first."""
@@ -339,7 +312,7 @@ class Watching:
                 if not n.undone or key in known:
                     continue
                 known.add(key)
-                since = _since(self.ordered, at, at, at)
+                since = since_of(self.ordered, at, at, at)
                 yield Alarm(n.effect, n.sensor, n.stage, "convention", None, None, None, "",
                             n.words, since, "undone before anything was fitted", None,
                             entry.number, (), words=n.words)  # fmt: skip
@@ -385,9 +358,3 @@ class Watching:
             one.spread,
             None if half is None else (one.value - half, one.value + half),
         )
-
-
-def _since(runs: Sequence[Entry], at: int, low: int, high: int) -> Since:
-    run, first, last = (runs[k] for k in (at, low, high))
-    return Since(run.number, run.run.files[0], run.run.date, first.number, last.number,
-                 first.run.date, last.run.date)  # fmt: skip

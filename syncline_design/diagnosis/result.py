@@ -377,11 +377,21 @@ class LogAlone(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Other(Record):
+    """Another effect that explains the same as well; nats_worse: by how much less."""
+
+    effect: str
+    sensor: str
+    stage: str
+    nats_worse: float
+
+
+@dataclass(frozen=True, slots=True)
 class UnlikeOthers(Record):
     """A log that is unlike all the others, and the effect in which it differs most clearly.
 
     differs: by how much from what the others together say, by parameter.  log10_chance: of so
-    much by noise alone, over all logs and effects.
+    much by noise alone, over all logs and effects.  aliases: effects that do as well in its place.
     """
 
     number: int
@@ -391,6 +401,7 @@ class UnlikeOthers(Record):
     stage: str
     differs: Mapping[str, Estimate]
     log10_chance: float
+    aliases: tuple[Other, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

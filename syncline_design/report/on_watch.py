@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
-from syncline_design.campaign.watch_result import Alarm, Watch, WatchedRun, e_value_text
+from syncline_design.campaign.watch_result import Alarm, Unsettled, Watch, WatchedRun, e_value_text
 from syncline_design.diagnosis.result import BlindSpot, UnlikeOthers
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
@@ -84,6 +84,8 @@ def _outcome(found: Watch) -> Outcome:
         return Outcome("warn", "?", f"Nothing seen to change, but {_odd_one(found)}")
     if not found.alarms and looks < FEWEST_RUNS:
         return Outcome("warn", "?", f"Too few runs to tell ({looks} of {FEWEST_RUNS})")
+    if found.unsettled is not None:
+        return Outcome("warn", "?", f"The runs are not all alike: {_name(found.unsettled)}")
     if not found.alarms and _shows_no_delay(found):
         last = _last(found).run
         return Outcome("warn", "?", f"Nothing seen to change, but run {last} shows no delay at all")
@@ -128,7 +130,7 @@ def _looks(found: Watch) -> int:
     return len([r for r in found.runs if r.run > found.baseline_after and not r.left_out])
 
 
-def _name(one: Alarm | BlindSpot | UnlikeOthers) -> str:
+def _name(one: Alarm | BlindSpot | UnlikeOthers | Unsettled) -> str:
     return f"{one.effect.replace('_', ' ')} ({one.sensor})"
 
 
