@@ -16,6 +16,7 @@ from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.pool import pool_of
+from syncline_design.campaign.seen import seen_changes
 from syncline_design.campaign.standing import standing
 from syncline_design.campaign.store import Entry, Stored, add_run
 from syncline_design.campaign.strangers import strangers
@@ -26,7 +27,17 @@ from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects import registry
 from syncline_design.spec.load import load
-from tests.watched_series import BOUND, LABELS, car_spec, kept, run_of, statistics, told, watch
+from tests.watched_series import (
+    BOUND,
+    LABELS,
+    UNITS,
+    car_spec,
+    kept,
+    run_of,
+    statistics,
+    told,
+    watch,
+)
 from tests.world import make_log, scenario
 
 OTHER = np.array([20.0, 10.0, 0, 0, 0]) * BOUND  # another vehicle's latency and range bias
@@ -277,6 +288,35 @@ def test_a_weaker_effect_of_the_same_day_is_told_beside_the_first(tmp_path: Path
         assert set(seen) <= {"latency", "range_bias"}
         told_too += "range_bias" in seen
     assert told_too == 12
+
+
+def test_two_effects_of_one_day_are_not_told_as_a_third() -> None:
+    """A latency and a range bias that moved together, and a datum's offset whose north is nearly
+    the one and whose east nearly the other: one effect of three values does it almost as well.
+    Where the two explain clearly more they are told, and the datum's offset is not."""
+    mixed = np.eye(len(LABELS))
+    north, east = LABELS.index(LABELS[2]), LABELS.index(LABELS[3])
+    mixed[0, north], mixed[1, east] = 0.98, 0.98
+    mixed[north, north] = mixed[east, east] = np.sqrt(1.0 - 0.98**2)
+    right = 0
+    for seed in range(15):
+        rng = np.random.default_rng([25, seed])
+        moved = np.array([22.0, 22.0, 0, 0, 0]) * BOUND
+        runs = []
+        for k in range(9):
+            columns = rng.standard_normal((64, len(LABELS))) @ mixed / UNITS
+            y = columns @ (moved * (k >= 5)) + rng.standard_normal(64)
+            normal = columns.T @ columns
+            runs.append(Sufficient(LABELS, normal, columns.T @ y, float(y @ y), normal / 64.0, ()))
+        told_of = seen_changes(Changes(pool_of(runs, range(9))), 6, 3.0)
+        names = sorted(one.change.term.label[0] for one in told_of)
+        right += names == ["latency", "range_bias"]
+        assert len(names) == len(set(names))
+        for one in told_of if names == ["latency", "range_bias"] else ():
+            true = 22.0 * BOUND[0 if one.change.term.label[0] == "latency" else 1]
+            assert abs(one.change.values[0] - true) < 4.5 * one.change.covariance[0, 0] ** 0.5
+            assert one.change.k == 5
+    assert right >= 13
 
 
 def test_what_would_do_as_well_is_said_of_a_run_and_of_what_scatters(

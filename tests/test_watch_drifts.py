@@ -12,10 +12,11 @@ import pytest
 
 import syncline_design.campaign.trends as trends_module
 from syncline_design.campaign.changes import Changes
-from syncline_design.campaign.compared_runs import ComparedRuns, Seen
+from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.oddities import DIFFERS
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.scatter import scattered
+from syncline_design.campaign.seen import Seen
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.strangers import share_of
 from syncline_design.campaign.trends import Trend, shapes, trends
@@ -143,7 +144,7 @@ def test_a_drift_is_told_by_run_and_by_what_it_came_to(tmp_path: Path) -> None:
     said = " ".join(watch(store, spec).output.split())
     assert "Drifts: latency (position), since 2026-09-22" in said
     assert f"latency drifts by {shown(alarm['drift']['text'])} a run since run 2" in said
-    assert f"{shown(alarm['text'])} by run 9" in said
+    assert f"{shown(alarm['text'])} by the last, run 9" in said
     assert "another value in every run" not in said
 
 
@@ -213,3 +214,37 @@ def test_of_a_boresight_about_one_axis_no_single_angle_is_told() -> None:
     names = [term.label[0] for term in changes.terms]
     worse = best[names.index("azimuth_bias")] - best[names.index("boresight")]
     assert worse < 2.0  # within what the commoner of two is told by
+
+
+def test_a_drift_that_ended_is_told_with_its_end(tmp_path: Path) -> None:
+    """Six bounds a run from run 2 to run 6 of ten, and no more: a slower drift that goes on, or a
+    step, would be many bounds off in most runs."""
+    spec, runs = car_spec(tmp_path / "spec.yaml"), []
+    for seed in range(8):
+        rng = np.random.default_rng([67, seed])
+        base = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+        each = np.array([6.0, 0, 0, 0, 0]) * BOUND
+        runs = [statistics(rng, base + each * min(k, 5)) for k in range(10)]
+        (one,) = seen_in(runs)
+        assert one.change.term.label[0] == "latency"
+        assert one.change.trend.kind == "drift"
+        assert (one.change.k, one.change.trend.until) in ((1, 6), (1, 5), (1, 7))
+        came = float(one.change.trend.over(10)[-1] * one.change.values[0])
+        assert came == pytest.approx(30.0 * BOUND[0], abs=4.0 * BOUND[0])
+    store = kept(spec, tmp_path, [run_of(one, k) for k, one in enumerate(runs)])
+    (alarm,) = told(spec, store, tmp_path, 1)["alarms"]
+    assert alarm["drift"]["ended"]
+    assert alarm["drift"]["by_run"] == 6
+    said = " ".join(watch(store, spec).output.split())
+    assert "Changed: latency (position), since" in said
+    assert f"until run 6: {shown(alarm['text'])}." in said
+
+
+def test_constants_that_a_drift_hid_are_not_told_as_another_effect() -> None:
+    """Runs tell their constants without what changed: a latency that was not 0 before it drifts is
+    else held near 0, and the datum's north, of cosine 0.9, told in its place."""
+    for seed in (7, 12):
+        (one,) = seen_in(drifting(seed, 10, 6.0, 1, 0.9))
+        assert one.change.term.label[0] == "latency"
+        sigma = one.change.covariance[0, 0] ** 0.5
+        assert abs(one.change.values[0] - 6.0 * BOUND[0]) < 4.0 * sigma

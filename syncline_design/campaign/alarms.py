@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.compared_runs import Seen
 from syncline_design.campaign.pool import Term
+from syncline_design.campaign.seen import Seen
 from syncline_design.campaign.store import Entry
 from syncline_design.campaign.watch_result import Alarm, Drift, Since, e_value_text
 from syncline_design.diagnosis.finding import estimate
@@ -17,7 +17,7 @@ from syncline_design.diagnosis.result import Other
 from syncline_design.model.figure_text import to_digits
 from syncline_design.model.normal import NORMAL_95
 
-SHOWN: Final = 2.0  # standard uncertainties from which a parameter of a changed effect is told
+SHOWN: Final = 3.0  # standard uncertainties from which a parameter of a changed effect is told
 
 
 def alarms_of(
@@ -38,7 +38,10 @@ def alarms_of(
         drift = None
         if change.trend.kind == "drift":
             each, own = float(change.values[k]), float(spread[k])
-            drift = Drift(each, own, estimate(each, own, slopes[k].unit).text, runs[-1].number)
+            until = change.trend.until
+            last = runs[-1 if until is None else until - 1].number
+            text = estimate(each, own, slopes[k].unit).text
+            drift = Drift(each, own, text, last, None if until is None else True)
         value, sigma = grown * float(change.values[k]), float(whole[k])
         half = NORMAL_95 * sigma
         e_value = math.exp(min(one.log_evidence, 690.0))

@@ -46,6 +46,7 @@ from syncline_design.campaign.freed_runs import (
     marginal,
     pseudo_inverse,
     with_beside,
+    with_own_free,
 )
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.pool import Pool, Term, inverted
@@ -140,14 +141,14 @@ class Changes:
         found: Array = log_weights(look)[:, None] + self._factors(freed, runs, self.inside(look))
         return found + self.log_weights
 
-    def _noise(self, look: int) -> float:
+    def noise(self, look: int) -> float:
         """Variance inside runs by the effect that is likeliest by the noise fitted."""
-        first = self._factors(self._freed(look), self.compared(look), np.ones(len(self.terms)))
+        first = self._factors(self._free(look), self.compared(look), np.ones(len(self.terms)))
         return float(self.inside(look)[int(np.argmax(first)) % len(self.terms)])
 
     def likelihoods(self, look: int) -> Array:
         """The same by one noise for all effects, that of the likeliest, so that they compare."""
-        runs, freed, noise = self.compared(look), self._freed(look), self._noise(look)
+        runs, freed, noise = self.compared(look), self._free(look), self.noise(look)
         found: Array = log_weights(look)[:, None] + self.log_weights
         return found + self._factors(freed, runs, np.full(len(self.terms), noise))
 
@@ -158,7 +159,7 @@ class Changes:
         By its width a prior prefers the fewer values, so that of a boresight about one axis the
         azimuth's bias alone would be told: 3 nat for every angle that stayed where it was.
         """
-        freed, noise = self._freed(look), self._noise(look)
+        freed, noise = self._free(look), self.noise(look)
         found = np.zeros((2 * (look - 1), len(self.terms)))
         for group, normal, score in zip(self.groups, freed.normals, freed.scores, strict=True):
             square = np.einsum("kga,kgab,kgb->kg", score, inverted(normal), score)
@@ -226,11 +227,15 @@ class Changes:
 
     def change(self, look: int, row: int, c: int) -> Change:
         """Effect c by one of the courses of the first `look` runs."""
-        runs, freed = self.compared(look), self._freed(look)
+        runs, freed = self.compared(look), self._free(look)
         log_factor = float(self._factors(freed, runs, self.inside(look))[row, c])
         one = self._fitted(look, freed, row, c)
         covariance = float(self.temper(look)[row, c]) * one.covariance
         return replace(one, covariance=covariance, log_factor=log_factor)
+
+    def single(self, look: int, c: int, trend: Trend) -> Change:
+        """Effect c with a trend, no other change, by the first `look` runs and the noise fitted."""
+        return self._fitted(look, self._free(look), trends(look).index(trend), c)
 
     def _fitted(self, look: int, freed: Freed, row: int, c: int) -> Change:
         """The same by the noise fitted."""
@@ -253,6 +258,10 @@ class Changes:
             for place, own in zip(group.terms, normal[last], strict=True):
                 found[int(place)] = own / factor[place]
         return found
+
+    def _free(self, look: int) -> Freed:
+        """N and s of every course, where every effect may have any value besides."""
+        return with_own_free(self.compared(look), self.groups, self._freed(look))
 
     @cached_property
     def _last(self) -> dict[int, Freed]:
@@ -326,12 +335,11 @@ class Changes:
         return clearly_differing(self.terms, self.groups, runs.normal, every)
 
     def likeliest(self, look: int) -> Change | None:
-        """The likeliest change by the first `look` runs and the noise fitted; None where none is
-        likelier."""
+        """The likeliest change by the noise fitted; None where none is likelier."""
         return self._likeliest_of(look, self.compared(look))
 
     def _likeliest_of(self, look: int, runs: Runs) -> Change | None:
-        freed = freed_by_trends(runs, self.groups)
+        freed = with_own_free(runs, self.groups, freed_by_trends(runs, self.groups))
         table = self._weighted(look, freed, runs)
         row, c = np.unravel_index(int(np.argmax(table)), table.shape)
         return self._fitted(look, freed, int(row), int(c)) if table[row, c] > 0.0 else None
@@ -385,10 +393,6 @@ class Changes:
     def taking(self, one: Change) -> Changes:
         """The same, what is left of the change free beside all others."""
         return self._of(self.without(one).pool, (*self.beside, one))
-
-    def alone(self) -> Changes:
-        """The same runs, nothing free beside."""
-        return self._of(self.pool, ())
 
     def _of(self, pool: Pool, beside: tuple[Change, ...]) -> Changes:
         found = Changes(pool, (), beside)

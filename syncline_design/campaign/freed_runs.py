@@ -26,6 +26,30 @@ def freed_by_trends(runs: Runs, groups: Sequence[SameSize]) -> Freed:
     return Freed(tuple(normals), tuple(scores[:, g.index] for g in groups))
 
 
+def with_own_free(runs: Runs, groups: Sequence[SameSize], found: Freed) -> Freed:
+    """The same where every effect may have any value besides what it is another by.
+
+    A constant that is held near 0, since the mean of a drift hid it, would else speak for another
+    effect.  With P the prior information of effect c, X = J S^-1[:, c] and
+    W = (P^-1 - S^-1[c, c])^-1,
+        N - X W X',   s - X W S^-1[c, :] g.
+    """
+    over = shapes(len(runs.normal))
+    cross = np.tensordot(over, runs.normal, axes=1) @ runs.inverse
+    prior = runs.total - runs.normal.sum(axis=0)
+    fit = runs.inverse @ runs.score.sum(axis=0)
+    normals, scores = [], []
+    for g, normal, score in zip(groups, found.normals, found.scores, strict=True):
+        held = prior[g.blocks]
+        across = cross[:, *g.blocks]
+        # (P^-1 - V)^-1 = P (1 - V P)^-1, which is 0 where nothing is held
+        own = held @ np.linalg.pinv(np.eye(held.shape[-1]) - runs.inverse[g.blocks] @ held)
+        moved = across @ own
+        normals.append(normal - moved @ np.swapaxes(across, -1, -2))
+        scores.append(score - np.einsum("kgab,gb->kga", moved, fit[g.index]))
+    return Freed(tuple(normals), tuple(scores))
+
+
 def with_beside(pool: Pool, look: int, beside: Sequence[Change]) -> tuple[Array, Array]:
     """Information and score of the first runs, what is beside as parameters after all others: of a
     change of course h they have h times the columns of its effect."""

@@ -22,14 +22,18 @@ DRIFTING: Final = 0.1  # share of the changes that grow from run to run
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """A change from one run on; k: place of the first run that has it."""
+    """A change from one run on; k: place of the first run that has it; until: of the first that is
+    as the one before, where a drift ended."""
 
     kind: Kind
     k: int
+    until: int | None = None
 
     def over(self, count: int) -> Array:
         """h of so many runs, (count,)."""
         since = np.maximum(np.arange(count) - self.k + 1.0, 0.0)
+        if self.until is not None:
+            since = np.minimum(since, float(self.until - self.k))
         found: Array = np.minimum(since, 1.0) if self.kind == "step" else since
         return found
 

@@ -87,12 +87,14 @@ class Since(Record):
 @dataclass(frozen=True, slots=True)
 class Drift(Record):
     """A parameter that is another with every run: by how much from one to the next, in SI; by_run:
-    the last run, by which it came to the whole change."""
+    the last run, by which it came to the whole change; ended: whether it is no longer another in
+    the runs after that."""
 
     per_run: float
     standard_uncertainty: float
     text: str
     by_run: int
+    ended: bool | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

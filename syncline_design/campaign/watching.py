@@ -14,12 +14,13 @@ import numpy as np
 from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.alarms import alarms_of, others_of, since_of
-from syncline_design.campaign.compared_runs import ComparedRuns, Seen
+from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.joint import JointError
 from syncline_design.campaign.looks import KeptLook
 from syncline_design.campaign.oddities import cautions, unsettled_in
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.run_values import RunParameter, run_values
+from syncline_design.campaign.seen import Seen
 from syncline_design.campaign.sight import sight
 from syncline_design.campaign.standing import StandingAlone, standing
 from syncline_design.campaign.store import (

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Final
 
 from syncline_design.campaign.watch_result import Alarm, Unsettled, Watch, WatchedRun, e_value_text
-from syncline_design.diagnosis.result import BlindSpot, UnlikeOthers
+from syncline_design.diagnosis.result import BlindSpot, Other, UnlikeOthers
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
@@ -85,7 +85,7 @@ def _outcome(found: Watch) -> Outcome:
     if not found.alarms and looks < FEWEST_RUNS:
         return Outcome("warn", "?", f"Too few runs to tell ({looks} of {FEWEST_RUNS})")
     if found.unsettled is not None:
-        return Outcome("warn", "?", f"The runs are not all alike: {_name(found.unsettled)}")
+        return Outcome("warn", "?", f"The runs are not all alike: {_name(found.unsettled, found)}")
     if not found.alarms and _shows_no_delay(found):
         last = _last(found).run
         return Outcome("warn", "?", f"Nothing seen to change, but run {last} shows no delay at all")
@@ -98,14 +98,15 @@ def _outcome(found: Watch) -> Outcome:
     own = [one for one in found.unlike or () if one.number == first.since.run]
     beyond = first.since.run in [run.run for run in found.contradicted]
     if first.alone or len(own) > 1 or (own and beyond):
-        names = sentence_list([_name(one) for one in own[:MOST_NAMED]])
+        names = sentence_list([_name(one, found) for one in own[:MOST_NAMED]])
         more = f" and {len(own) - MOST_NAMED} more" if len(own) > MOST_NAMED else ""
         also = f"{_contradiction(found, first.since.run)} and " if beyond else ""
         words = f"Run {first.since.run} {also}is unlike the others: {names}{more}"
         return Outcome("bad", "!", words)
     when = first.since.date or f"run {first.since.run}"
-    what = "Changed" if first.drift is None else "Drifts"
-    return Outcome("bad", "!", f"{what}: {_name(first)}, since {when}")
+    drifts = first.drift is not None and not first.drift.ended
+    what = "Drifts" if drifts else "Changed"
+    return Outcome("bad", "!", f"{what}: {_name(first, found)}, since {when}")
 
 
 def _odd_one(found: Watch) -> str:
@@ -130,13 +131,17 @@ def _looks(found: Watch) -> int:
     return len([r for r in found.runs if r.run > found.baseline_after and not r.left_out])
 
 
-def _name(one: Alarm | BlindSpot | UnlikeOthers | Unsettled) -> str:
-    return f"{one.effect.replace('_', ' ')} ({one.sensor})"
+def _name(one: Alarm | BlindSpot | UnlikeOthers | Unsettled | Other, found: Watch) -> str:
+    """`latency (position)`; of a chain with the stage, `latency (position, ship)`."""
+    stages = {value.stage for run in found.runs for value in run.values}
+    stage = getattr(one, "stage", None) if len(stages) > 1 else None
+    place = f"{one.sensor}, {stage}" if stage else one.sensor
+    return f"{one.effect.replace('_', ' ')} ({place})"
 
 
 def _sentences(found: Watch) -> Iterator[Inline]:
     for one in found.alarms:
-        yield _sentence(one)
+        yield _sentence(one, found)
     if found.alarms:
         lone = list(dict.fromkeys(one.since.run for one in found.alarms if one.alone))
         out = f"watch STORE --leave-out {lone[0] if len(lone) == 1 else 'N'} --reason TEXT"
@@ -170,20 +175,20 @@ def _shows_no_delay(found: Watch) -> bool:
 def _blind(found: Watch) -> str:
     """`Run 13 (P13.csv) could not have shown ...`."""
     last = _last(found)
-    names = sorted({_name(one) for one in found.informative.blind_to})
+    names = sorted({_name(one, found) for one in found.informative.blind_to})
     return (
         f"Run {last.run} ({last.files[0]}) could not have shown every change that would turn a "
         f"requirement: it is blind to {sentence_list(names)}."
     )
 
 
-def _sentence(one: Alarm) -> str:
+def _sentence(one: Alarm, found: Watch) -> str:
     """`Latency (position): latency changed by 2.5 ms with run 7 (day7.csv).`"""
     dated = f", {one.since.date}" if one.since.date else ""
     place = f"run {one.since.run} ({one.since.file}{dated})"
     if one.words is not None:
         return f"Since {place}: {one.words}."
-    name = _name(one)
+    name = _name(one, found)
     name = name[0].upper() + name[1:]
     if one.alone:
         return f"{name}: {_parameter(one)} differs by {one.text} in {place} alone."
@@ -193,7 +198,11 @@ def _sentence(one: Alarm) -> str:
         ends = f"{first} to {last}" if first and last else f"{one.since.low} to {one.since.high}"
         near = f", with 95 % one of the runs {ends}"
     if one.drift is not None:
-        each, by = f"{one.drift.text} a run", f"{one.text} by run {one.drift.by_run}"
+        each = f"{one.drift.text} a run"
+        if one.drift.ended:
+            until = f"until run {one.drift.by_run}: {one.text}"
+            return f"{name}: {_parameter(one)} drifted by {each} since {place}{near}, {until}."
+        by = f"{one.text} by the last, run {one.drift.by_run}"
         return f"{name}: {_parameter(one)} drifts by {each} since {place}{near}: {by}."
     return f"{name}: {_parameter(one)} changed by {one.text} with {place}{near}."
 
@@ -240,15 +249,16 @@ def _counted(found: Watch) -> str:
 
 
 def _alarms(found: Watch) -> list[Node]:
-    return [_alarm(one) for one in found.alarms]
+    return [_alarm(one, found) for one in found.alarms]
 
 
-def _alarm(one: Alarm) -> Node:
+def _alarm(one: Alarm, found: Watch) -> Node:
     what = "Departure" if one.alone else "Change"
     facts: list[tuple[str, str]] = [(f"{what} of {_parameter(one)}", one.text)]
     if one.drift is not None:
         facts[0] = (f"Drift of {_parameter(one)}", f"{one.drift.text} a run")
-        facts.append((f"By run {one.drift.by_run}", one.text))
+        by = "Until" if one.drift.ended else "By the last,"
+        facts.append((f"{by} run {one.drift.by_run}", one.text))
     if one.interval95 is not None and one.change is not None:
         told = format_interval(
             one.change, one.standard_uncertainty or 0.0, one.interval95, one.unit
@@ -260,12 +270,12 @@ def _alarm(one: Alarm) -> Node:
     )
     nodes: list[Node] = [
         Heading(given(one.effect.replace("_", " ")), given(f"{one.sensor}, {one.stage}")),
-        Text(_sentence(one), reach="page"),
+        Text(_sentence(one, found), reach="page"),
         Facts(tuple(facts)),
         Text(f"Evidence: {one.evidence}; first at run {one.first_run}."),
     ]
     if one.aliases:
-        names = sentence_list([f"{o.effect.replace('_', ' ')} ({o.sensor})" for o in one.aliases])
+        names = sentence_list([_name(other, found) for other in one.aliases])
         apart = registry()[one.effect].separated_by if one.effect in registry() else ""
         words = f"These runs cannot tell it apart from a change of {names}. To separate: {apart}."
         nodes.append(Text(words, mark="!", tone="warn"))

@@ -1,0 +1,171 @@
+"""Changes of runs as they are told: by how much, since when, and what else it could be."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.pool import Term, inverted
+from syncline_design.campaign.possible_changes import PossibleChange
+from syncline_design.campaign.run_records import Change
+from syncline_design.campaign.trends import trends
+from syncline_design.campaign.what_changed import Taken, what_changed
+from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
+
+RIVAL_NATS: Final = 3.0
+CREDIBLE: Final = 0.95
+UNDONE: Final = 2.5  # standard uncertainties within which one drift undoes another
+ROUNDS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A change that was seen: the best, at which look first, how sure, what else it could be.
+
+    dating, dating_now: covariances (p, p) of its values by not knowing the first run that has it,
+    and of what it came to by the last run, by not knowing whether it is a step or a drift either.
+    """
+
+    change: Change
+    low: int
+    high: int
+    first_look: int
+    log_evidence: float
+    others: tuple[tuple[Term, float], ...]
+    dating: Array
+    dating_now: Array
+
+
+def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, ...]:
+    """What changed in runs of which the look after `first` of them rang, the strongest first."""
+    told = list(what_changed(changes, first, threshold))
+    count = changes.pool.count
+    while True:
+        fitted = _together(changes, [one.one for one in told], count)
+        weakest = min(range(len(told)), key=lambda k: _explained(fitted[k]))
+        if _explained(fitted[weakest]) >= threshold:
+            seen = [_seen(changes, told, k, fitted, first) for k in range(len(told))]
+            return tuple(_with_ends(seen))
+        if len(told) == 1:
+            return (_went_back(changes, told[0], first),)
+        told.pop(weakest)
+
+
+def _with_ends(seen: Sequence[Seen]) -> list[Seen]:
+    """Two drifts of an effect, of which the later undoes the earlier, as one that ended."""
+    kept = list(seen)
+    for begun, ended in itertools.permutations(seen, 2):
+        if begun in kept and ended in kept and _ends(begun.change, ended.change):
+            trend = replace(begun.change.trend, until=ended.change.k)
+            grown = float(ended.change.k - begun.change.k)
+            one = replace(begun, change=replace(begun.change, trend=trend),
+                          dating_now=grown**2 * begun.dating)  # fmt: skip
+            kept[kept.index(begun)] = one
+            kept.remove(ended)
+    return kept
+
+
+def _ends(begun: Change, ended: Change) -> bool:
+    same = begun.term.label == ended.term.label and begun.trend.kind == ended.trend.kind == "drift"
+    if not same or begun.k >= ended.k:
+        return False
+    left = begun.values + ended.values
+    spread = np.sqrt(np.diag(begun.covariance) + np.diag(ended.covariance))
+    return bool(np.all(np.abs(left) <= UNDONE * spread))
+
+
+def _went_back(changes: Changes, told: Taken, first: int) -> Seen:
+    """A change for which by now nothing speaks, as it was when it rang."""
+    one = told.one
+    look = max(first, one.trend.k + 1)
+    best = changes.change(look, trends(look).index(one.trend), one.effect)
+    return _dated(changes, look, told, best, first)
+
+
+def _seen(
+    changes: Changes, told: Sequence[Taken], k: int, fitted: Sequence[Change], first: int
+) -> Seen:
+    """One of several, the others taken off and what is left of them free."""
+    rest = changes
+    for at, other in enumerate(fitted):
+        if at != k:
+            rest = rest.taking(other)
+    return _dated(rest, changes.pool.count, told[k], fitted[k], first)
+
+
+def _dated(changes: Changes, look: int, told: Taken, best: Change, first: int) -> Seen:
+    """A change with the runs that may be its first, and the effects that do as well."""
+    known, c = trends(look), told.one.effect
+    table = changes.likelihoods(look)[:, c]
+    share = np.exp(table - np.logaddexp.reduce(table))
+    order = np.argsort(-share)
+    needed = order[: int(np.searchsorted(np.cumsum(share[order]), CREDIBLE)) + 1]
+    near = [(changes.change(look, int(k), c), float(share[k])) for k in needed]
+    same = [(one, own) for one, own in near if one.trend.kind == best.trend.kind]
+    firsts = [known[k].k for k in needed] + [best.k]
+    each = np.logaddexp.reduce(changes.gains(look), axis=0)
+    others = [(changes.terms[i], float(each[c] - each[i])) for i in np.argsort(-each)
+              if i != c and each[i] > each[c] - RIVAL_NATS]  # fmt: skip
+    return Seen(
+        best, min(firsts), max(firsts), first, told.log_evidence, tuple(others),
+        _apart(best, same, lambda one: 1.0),
+        _apart(best, near, lambda one: float(one.trend.over(look)[-1])),
+    )  # fmt: skip
+
+
+def _apart(
+    best: Change, near: Sequence[tuple[Change, float]], grown: Callable[[Change], float]
+) -> Array:
+    """Covariance (p, p) about the best of values, grown as they are, of changes by their shares."""
+    if not near:
+        return np.zeros((best.values.size, best.values.size))
+    values = np.array([grown(one) * one.values for one, _ in near]) - grown(best) * best.values
+    shares = np.array([share for _, share in near])
+    return np.asarray(values.T @ (values * shares[:, None]) / shares.sum())
+
+
+def _explained(change: Change) -> float:
+    """d' C^-1 d / 2 [nat] of a change."""
+    return 0.5 * float(change.values @ inverted(change.covariance) @ change.values)
+
+
+def _together(changes: Changes, ones: Sequence[PossibleChange], look: int) -> list[Change]:
+    """Several changes fitted at once to the first `look` runs, by the scatter that they leave.
+
+    With h_i the course of a change over the runs and J_i = sum h_i I[c_i, :],
+        N_ij = sum h_i h_j I[c_i, c_j] - J_i S^-1 J_j',   s_i = sum h_i g[c_i] - J_i S^-1 g.
+    """
+    known = [changes.single(look, one.effect, one.trend) for one in ones]
+    for _ in range(ROUNDS):  # without what is known the runs tell their constants and scatter
+        left = _fitted(changes.without(*known), known, look)
+        known = [replace(own, values=one.values + own.values)
+                 for one, own in zip(known, left, strict=True)]  # fmt: skip
+    return known
+
+
+def _fitted(changes: Changes, ones: Sequence[Change], look: int) -> list[Change]:
+    runs, temper = changes.compared(look), changes.temper(look)
+    over = [one.trend.over(look) for one in ones]
+    index = [one.term.index for one in ones]
+    across = np.concatenate([np.tensordot(h, runs.normal[:, own], axes=1)
+                             for h, own in zip(over, index, strict=True)])  # fmt: skip
+    scores = np.concatenate([h @ runs.score[:, own] for h, own in zip(over, index, strict=True)])
+    both = [[np.tensordot(over[i] * over[j], runs.normal[:, index[i][:, None], index[j]], axes=1)
+             for j in range(len(ones))] for i in range(len(ones))]  # fmt: skip
+    inverse = inverted(np.block(both) - across @ runs.inverse @ across.T)
+    values = inverse @ (scores - across @ (runs.inverse @ runs.score.sum(axis=0)))
+    place = {term.label: k for k, term in enumerate(changes.terms)}
+    row = {trend: k for k, trend in enumerate(trends(look))}
+    found, end = [], 0
+    for one in ones:
+        at = slice(end, end + one.term.size)
+        end += one.term.size
+        factor = float(temper[row[one.trend], place[one.term.label]])
+        found.append(replace(one, values=values[at], covariance=factor * inverse[at, at]))
+    return found

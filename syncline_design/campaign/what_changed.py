@@ -1,0 +1,193 @@
+"""What runs say that changed: which effects, each with which trend (`possible_changes`).
+
+The likeliest change is told first, and another where it is as clear as an alarm, or as an effect of
+a day on which something changed already.  After each, every one of them is held against whatever
+could be in its place: another effect, another trend, or two instead of one.  So what two make
+together (a boresight and a range bias that moved on one day) is not told as a third, nor a drift
+that ended as a slower one that goes on.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.changes import Changes
+from syncline_design.campaign.possible_changes import PossibleChange, PossibleChanges
+from syncline_design.campaign.run_records import Change
+from syncline_design.campaign.trends import Trend, trends
+from syncline_design.diagnosis.candidates import commonness
+from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
+
+AS_GOOD_NATS: Final = 2.0
+INSTEAD_NATS: Final = (
+    3.0  # by which two in the place of one explain more, all their freedom counted
+)
+MOST_CHANGES: Final = 8
+ROUNDS: Final = 2
+MOST_TRIED: Final = 60  # likeliest firsts of two that are tried in the place of one
+MOST_MOVES: Final = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A change, and log of the evidence by which it was taken."""
+
+    one: PossibleChange
+    log_evidence: float
+
+
+def what_changed(changes: Changes, first: int, threshold: float) -> tuple[Taken, ...]:
+    """Changes of runs of which the look after `first` of them rang; one that went back is told as
+    it was then where nothing is now."""
+    look = changes.pool.count
+    found: list[PossibleChange] = []
+    fitted: list[Change] = []
+    evidence: list[float] = []
+    while len(found) < MOST_CHANGES:
+        state, at, only = _beside(changes, fitted), look, None
+        total = state.log_evidence(at)[0]
+        if not found and total < math.log(2.0):
+            at = first
+            total = state.log_evidence(at)[0]
+        elif found and total < threshold:
+            only = {one.trend for one in found}
+            total = state.of_one_day(at, [trends(at).index(one) for one in only])
+            if total < threshold:
+                break
+        one = _next(changes, fitted, found, at, only)
+        found, evidence = [*found, one], [*evidence, total]
+        if at == look:
+            found = _held_against_others(changes, _fits(changes, fitted, found, look), found)
+            evidence += [total] * (len(found) - len(evidence))
+        fitted = _fits(changes, fitted, found, look)
+    return tuple(Taken(*pair) for pair in zip(found, evidence, strict=True))
+
+
+def _beside(changes: Changes, fitted: Sequence[Change]) -> Changes:
+    """Runs less what was found, what is left of it free."""
+    for one in fitted:
+        changes = changes.taking(one)
+    return changes
+
+
+def _next(
+    changes: Changes,
+    fitted: Sequence[Change],
+    found: Sequence[PossibleChange],
+    at: int,
+    only: set[Trend] | None,
+) -> PossibleChange:
+    """The likeliest change beside those that are known, of some trends alone where these are."""
+    if not found:
+        gains = changes.gains(at)
+        return _commonest(changes, trends(at), gains)
+    possible = _possible(changes, fitted, at)
+    gains = possible.gains(found)
+    if only is not None:
+        gains[[one not in only for one in possible.trends]] = -math.inf
+    return _commonest(changes, possible.trends, gains)
+
+
+def _fits(
+    changes: Changes,
+    before: Sequence[Change],
+    found: Sequence[PossibleChange],
+    look: int,
+) -> list[Change]:
+    """What was found, fitted together; before: as it was known, the constants told without it."""
+    known = {(one.term.label, one.trend): one for one in before}
+    labels = [(changes.terms[one.effect].label, one.trend) for one in found]
+    first = [known.get(label) or changes.single(look, one.effect, one.trend)
+             for label, one in zip(labels, found, strict=True)]  # fmt: skip
+    for _ in range(ROUNDS):
+        first = PossibleChanges(changes, look, (), tuple(first)).values(found)
+    return first
+
+
+def _held_against_others(
+    changes: Changes, fitted: Sequence[Change], found: Sequence[PossibleChange]
+) -> list[PossibleChange]:
+    """What was found, refined.
+
+    Where a trend stands for two (a drift that ended), what it leaves looks like an effect that
+    differs from run to run; free in every run, that would hide the two.  So they are tried without
+    it, and taken where nothing that differs is left.
+    """
+    look = changes.pool.count
+    usual = _possible(changes, fitted, look)
+    if usual.freed:
+        plain = _refined(replace(usual, freed=()), found)
+        left = changes.without(*_fits(changes, fitted, plain, look))
+        if len(plain) <= len(found) + 1 and not left.compared(look).freed:
+            return plain
+    return _refined(usual, found)
+
+
+def _possible(changes: Changes, fitted: Sequence[Change], look: int) -> PossibleChanges:
+    """What could have changed; effects are free in every run that differ from one to the next where
+    what was found is taken off."""
+    left = changes.without(*fitted)
+    return PossibleChanges(changes, look, left.compared(look).freed, tuple(fitted))
+
+
+def _commonest(changes: Changes, known: Sequence[Trend], gains: Array) -> PossibleChange:
+    """The likeliest change; of those that are as good, the commonest."""
+    each = gains.max(axis=0)
+    close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
+    c = min(map(int, close), key=lambda k: (commonness(changes.terms[k].label), -each[k]))
+    return PossibleChange(c, known[int(np.argmax(gains[:, c]))])
+
+
+def _refined(possible: PossibleChanges, found: Sequence[PossibleChange]) -> list[PossibleChange]:
+    """The same, each held against what could be in its place."""
+    kept = list(found)
+    for _ in range(MOST_MOVES):
+        moves = [move for k in range(len(kept)) for move in _instead(possible, kept, k)]
+        better = [move for move in moves if len(move[1]) <= MOST_CHANGES]
+        if not better:
+            break
+        kept = max(better, key=lambda move: move[0])[1]
+    return _named(possible, kept)
+
+
+def _named(possible: PossibleChanges, found: Sequence[PossibleChange]) -> list[PossibleChange]:
+    """The same, each by the commonest effect that does as well in its place with its trend."""
+    kept, terms = list(found), possible.changes.terms
+    for k, one in enumerate(kept):
+        row = possible.trends.index(one.trend)
+        gains = possible.gains([*kept[:k], *kept[k + 1 :]])[row]
+        close = np.flatnonzero(gains >= gains[one.effect] - AS_GOOD_NATS)
+        best = min(map(int, close), key=lambda c: (commonness(terms[c].label), -gains[c]))
+        kept[k] = replace(one, effect=best)
+    return kept
+
+
+def _instead(
+    possible: PossibleChanges, found: Sequence[PossibleChange], k: int
+) -> Iterator[tuple[float, list[PossibleChange]]]:
+    """Sets with another change, or two, in the place of one, that explain more, and by how much."""
+    rest = [one for at, one in enumerate(found) if at != k]
+    gains = possible.gains(rest)
+    own = float(gains[possible.trends.index(found[k].trend), found[k].effect])
+    if float(gains.max()) > own + AS_GOOD_NATS:
+        one = _commonest(possible.changes, possible.trends, gains)
+        yield float(gains.max()) - own, [*rest, one]
+    for row, c in itertools.islice(_likeliest(gains), MOST_TRIED):
+        first = PossibleChange(c, possible.trends[row])
+        second = possible.gains([*rest, first])
+        both = float(gains[row, c] + second.max()) - INSTEAD_NATS
+        if both > own + AS_GOOD_NATS:
+            yield both - own, [*rest, first, _commonest(possible.changes, possible.trends, second)]
+
+
+def _likeliest(gains: Array) -> Iterator[tuple[int, int]]:
+    for place in np.argsort(-gains, axis=None):
+        row, c = np.unravel_index(int(place), gains.shape)
+        yield int(row), int(c)
