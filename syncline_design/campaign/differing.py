@@ -43,7 +43,9 @@ def clearly_differing(
     for g, scatter in zip(groups, scatters, strict=True):
         least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
         clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
-        excess[g.terms] = least / np.where(free > 0.0, free, np.inf) - 1.0
+        # the least of so many is less than scatter leaves, by some 2 log of them as chi-square goes
+        searched = np.maximum(free - 2.0 * math.log(len(scatter.square)), 1.0)
+        excess[g.terms] = least / np.where(free > 0.0, searched, np.inf) - 1.0
         beyond[g.terms] = np.where(free > 0.0, least - free, 0.0)
         pairs = zip(least, free, strict=True)
         chance[g.terms] = [log_p_of(float(q), int(f)) if f > 0.0 else 0.0 for q, f in pairs]
