@@ -154,10 +154,9 @@ class Changes:
 
     def gains(self, look: int) -> Array:
         """What every course and effect explains by one noise for all, less a nat a value, and the
-        logs of their weights, (2 (look - 1), C).
-
-        By its width a prior prefers the fewer values, so that of a boresight about one axis the
-        azimuth's bias alone would be told: 3 nat for every angle that stayed where it was.
+        logs of their weights, (2 (look - 1), C).  By its width a prior prefers fewer values, so
+        that of a boresight about one axis the azimuth's bias alone would be told: 3 nat for every
+        angle that stayed where it was.
         """
         freed, noise = self._free(look), self.noise(look)
         found = np.zeros((2 * (look - 1), len(self.terms)))
@@ -317,7 +316,8 @@ class Changes:
             if likely is not None:
                 found = self._compared(look, found.normal, found.score, likely)
             for _ in range(MOST_SCATTERED):
-                one = clearly_differing(self.terms, self.groups, found.normal, found.scatters)
+                now = found.normal, found.scatters, whole
+                one = clearly_differing(self.terms, self.groups, *now)
                 if one is None:
                     break
                 freed = (*found.freed, one)
@@ -332,7 +332,7 @@ class Changes:
         change or scatter; None where noise would do."""
         runs = self.compared(look)
         every = [replace(one, square=one.square[-1:], free=one.free[-1:]) for one in runs.whole]
-        return clearly_differing(self.terms, self.groups, runs.normal, every)
+        return clearly_differing(self.terms, self.groups, runs.normal, every, every)
 
     def likeliest(self, look: int) -> Change | None:
         """The likeliest change by the noise fitted; None where none is likelier."""

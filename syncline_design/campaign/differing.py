@@ -31,21 +31,24 @@ def clearly_differing(
     groups: Sequence[SameSize],
     normal: Array,
     scatters: Sequence[RunScatter],
+    most: Sequence[RunScatter],
 ) -> Differing | None:
     """The effect that differs most clearly from run to run; None where noise would do.  One change
     of it is none, of any course that the scatters know.
 
-    normal (look, P, P): information of the runs; scatters: by group.
+    normal (look, P, P): information of the runs; scatters: by group.  most: before any change was
+    taken off, by which they differ at most.
     """
     if not terms:
         return None
     clear, excess, chance, beyond = (np.zeros(len(terms)) for _ in range(4))
-    for g, scatter in zip(groups, scatters, strict=True):
+    for g, scatter, alone in zip(groups, scatters, most, strict=True):
         least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
         clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
         # the least of so many is less than scatter leaves, by some 2 log of them as chi-square goes
         searched = np.maximum(free - 2.0 * math.log(len(scatter.square)), 1.0)
-        excess[g.terms] = least / np.where(free > 0.0, searched, np.inf) - 1.0
+        whole = alone.square[-1] / np.maximum(alone.free[-1], 1)
+        excess[g.terms] = np.where(free > 0.0, np.minimum(least / searched, whole), 0.0) - 1.0
         beyond[g.terms] = np.where(free > 0.0, least - free, 0.0)
         pairs = zip(least, free, strict=True)
         chance[g.terms] = [log_p_of(float(q), int(f)) if f > 0.0 else 0.0 for q, f in pairs]
