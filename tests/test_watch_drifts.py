@@ -15,11 +15,13 @@ from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.oddities import DIFFERS
 from syncline_design.campaign.pool import pool_of
+from syncline_design.campaign.possible_changes import PossibleChange, PossibleChanges
 from syncline_design.campaign.scatter import scattered
 from syncline_design.campaign.seen import Seen
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.strangers import share_of
 from syncline_design.campaign.trends import Trend, shapes, trends
+from syncline_design.campaign.what_changed import refined
 from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.effects import registry
 from tests.watched_series import (
@@ -248,3 +250,15 @@ def test_constants_that_a_drift_hid_are_not_told_as_another_effect() -> None:
         assert one.change.term.label[0] == "latency"
         sigma = one.change.covariance[0, 0] ** 0.5
         assert abs(one.change.values[0] - 6.0 * BOUND[0]) < 4.0 * sigma
+
+
+def test_one_trend_is_told_where_two_explain_no_more() -> None:
+    """A step and a later drift that stood for a drift while its runs were few."""
+    for seed in range(6):
+        changes = Changes(pool_of(drifting(seed, 10, 4.0, 1), range(10)))
+        latency = [term.label[0] for term in changes.terms].index("latency")
+        two = [PossibleChange(latency, trend) for trend in (Trend("step", 4), Trend("drift", 6))]
+        known = tuple(changes.single(10, one.effect, one.trend) for one in two)
+        (one,) = refined(PossibleChanges(changes, 10, (), known), two)
+        assert (one.effect, one.trend.kind) == (latency, "drift")
+        assert one.trend.k in (1, 2)

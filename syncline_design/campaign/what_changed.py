@@ -53,9 +53,9 @@ def what_changed(changes: Changes, first: int, threshold: float) -> tuple[Taken,
     while len(found) < MOST_CHANGES:
         state, at, only = _beside(changes, fitted), look, None
         total = state.log_evidence(at)[0]
-        if not found and total < math.log(2.0):
-            at = first
-            total = state.log_evidence(at)[0]
+        if not found and total < threshold:  # an alarm stays, by what it rang with
+            total = state.log_evidence(first)[0]
+            at = look if changes.gains(look).max() >= threshold else first
         elif found and total < threshold:
             only = {one.trend for one in found}
             total = state.of_one_day(at, [trends(at).index(one) for one in only])
@@ -123,11 +123,11 @@ def _held_against_others(
     look = changes.pool.count
     usual = _possible(changes, fitted, look)
     if usual.freed:
-        plain = _refined(replace(usual, freed=()), found)
+        plain = refined(replace(usual, freed=()), found)
         left = changes.without(*_fits(changes, fitted, plain, look))
         if len(plain) <= len(found) + 1 and not left.compared(look).freed:
             return plain
-    return _refined(usual, found)
+    return refined(usual, found)
 
 
 def _possible(changes: Changes, fitted: Sequence[Change], look: int) -> PossibleChanges:
@@ -145,11 +145,12 @@ def _commonest(changes: Changes, known: Sequence[Trend], gains: Array) -> Possib
     return PossibleChange(c, known[int(np.argmax(gains[:, c]))])
 
 
-def _refined(possible: PossibleChanges, found: Sequence[PossibleChange]) -> list[PossibleChange]:
+def refined(possible: PossibleChanges, found: Sequence[PossibleChange]) -> list[PossibleChange]:
     """The same, each held against what could be in its place."""
     kept = list(found)
     for _ in range(MOST_MOVES):
         moves = [move for k in range(len(kept)) for move in _instead(possible, kept, k)]
+        moves += _one_for_two(possible, kept)
         better = [move for move in moves if len(move[1]) <= MOST_CHANGES]
         if not better:
             break
@@ -185,6 +186,22 @@ def _instead(
         both = float(gains[row, c] + second.max()) - INSTEAD_NATS
         if both > own + AS_GOOD_NATS:
             yield both - own, [*rest, first, _commonest(possible.changes, possible.trends, second)]
+
+
+def _one_for_two(
+    possible: PossibleChanges, found: Sequence[PossibleChange]
+) -> Iterator[tuple[float, list[PossibleChange]]]:
+    """Sets with one change in the place of two that explain no more than it."""
+    for a, b in itertools.combinations(range(len(found)), 2):
+        rest = [one for at, one in enumerate(found) if at not in (a, b)]
+        gains = possible.gains(rest)
+        row = possible.trends.index
+        both = gains[row(found[a].trend), found[a].effect]
+        beside = possible.gains([*rest, found[a]])
+        both += beside[row(found[b].trend), found[b].effect]
+        if float(gains.max()) >= float(both):
+            one = _commonest(possible.changes, possible.trends, gains)
+            yield float(gains.max() - both), [*rest, one]
 
 
 def _likeliest(gains: Array) -> Iterator[tuple[int, int]]:
