@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from syncline_design.campaign.changes import Changes
-from syncline_design.campaign.oddities import _differing
+from syncline_design.campaign.oddities import scattering
 from syncline_design.campaign.pool import Pool, Scoped, fitted, pool_of
 from syncline_design.campaign.store import add_run, read_store
 from syncline_design.campaign.unlike import _difference, unlike_logs
@@ -114,7 +114,7 @@ def said_to_differ(runs: list[Sufficient]) -> bool:
     """Whether any look at a series says that an effect has another value in every run."""
     changes = Changes(pool_of(runs, list(range(len(runs)))))
     looks = range(3, len(runs) + 1)
-    return any(list(_differing(changes, (), look, str)) for look in looks)
+    return any(list(scattering(changes, (), look)) for look in looks)
 
 
 def test_four_runs_that_scatter_by_chance_are_not_said_to_differ() -> None:

@@ -9,7 +9,9 @@ beside it what is left of its own, of directions that are another thing than M.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
@@ -25,6 +27,8 @@ from syncline_design.campaign.trends import Trend, log_weights, trends
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
+RIVAL_NATS: Final = 3.0
+TOLD: Final = 3.0  # standard uncertainties from which a parameter is told
 MOST_TRENDS: Final = 40  # the likeliest of all that so many runs have
 
 
@@ -40,22 +44,30 @@ class PossibleChange:
 class PossibleChanges:
     """All changes that the first `look` runs may have had; freed: effects that differ from run to
     run, which have a value of their own in each.  off: changes that are as good as known, without
-    which the constants of the runs are told."""
+    which the constants of the runs are told.  needed: trends that are among them; only: no others.
+    """
 
     changes: Changes
     look: int
     freed: tuple[Differing, ...] = ()
     off: tuple[Change, ...] = ()
+    needed: tuple[Trend, ...] = ()
+    only: bool = False
 
     @cached_property
     def trends(self) -> tuple[Trend, ...]:
+        if self.only:
+            return tuple(dict.fromkeys(self.needed))
         every = trends(self.look)
-        if len(every) <= MOST_TRENDS:
-            return every
-        best = np.max(self.changes.gains(self.look), axis=1)
-        likely = {every[k] for k in np.argsort(-best)[:MOST_TRENDS]}
-        needed = {one.trend for one in self.off}
-        return tuple(one for one in every if one in likely or one in needed)
+        if len(every) > MOST_TRENDS:
+            best = np.max(self.changes.gains(self.look), axis=1)
+            every = tuple(every[k] for k in sorted(np.argsort(-best)[:MOST_TRENDS]))
+        return tuple(dict.fromkeys((*every, *self.needed)))
+
+    def knowing(self, ones: Sequence[PossibleChange]) -> PossibleChanges:
+        """The same with the trends that some have."""
+        missing = [one.trend for one in ones if one.trend not in self.trends]
+        return replace(self, needed=(*self.needed, *missing)) if missing else self
 
     @cached_property
     def noise(self) -> float:
@@ -127,8 +139,44 @@ class PossibleChanges:
             found[self.trends.index(one.trend), one.effect] = -np.inf
         return found
 
+    def rivals(self, found: Sequence[PossibleChange], k: int) -> list[tuple[int, float]]:
+        """Effects that explain as well what one of a set does, with its trend, and by how many nats
+        less: in its place, or in that of one of its parameters, a nat a value counted."""
+        one, rest = found[k], [other for at, other in enumerate(found) if at != k]
+        gains = self.gains(rest)[self.trends.index(one.trend)]
+        worse = {i: float(gains[one.effect] - gains[i]) for i in range(len(gains))}
+        if self.changes.terms[one.effect].size > 1:
+            for i in set(worse) - {other.effect for other in found}:
+                worse[i] = min(worse[i], self._in_place_of_one(found, k, i))
+        near = [(i, by) for i, by in worse.items() if i != one.effect and by < RIVAL_NATS]
+        return sorted(near, key=lambda pair: pair[1])
+
+    def _in_place_of_one(self, found: Sequence[PossibleChange], k: int, effect: int) -> float:
+        """How much less [nat] a set explains with an effect in the place of a parameter of another
+        that is told, of all these the least."""
+        change = self.values(found)[k]
+        spread = np.sqrt(self.noise * np.maximum(np.diag(change.covariance), 0.0))
+        told = np.flatnonzero(np.abs(change.values) > TOLD * spread)
+        if len(told) < 2:  # a single one is the whole effect
+            return np.inf
+        first = len(self._columns(found[:k]))
+        own = self._columns([*found, PossibleChange(effect, found[k].trend)])
+        less = [self._explained(np.delete(own, first + int(p))) for p in told]
+        more = self.changes.terms[effect].size - 1
+        return self._explained(self._columns(found)) - max(less) + more
+
+    def _explained(self, columns: Index) -> float:
+        """s_M' N_MM^-1 s_M / 2 [nat] by the noise."""
+        normal, score = self._sums
+        inverse = inverted(normal[np.ix_(columns, columns)])
+        return 0.5 * float(score[columns] @ inverse @ score[columns]) / self.noise
+
     def _weights(self, beside: Sequence[PossibleChange]) -> Array:
-        """log of the trends' weights, 0 of those that a change beside has."""
+        """log of the trends' weights, 0 of those that a change beside has; any end is as likely."""
         known = dict(zip(trends(self.look), log_weights(self.look), strict=True))
         had = {one.trend for one in beside}
-        return np.array([0.0 if one in had else float(known[one]) for one in self.trends])
+        ends = math.log(self.look)
+        own = [float(known[one.begun]) - (0.0 if one.until is None else ends)
+               for one in self.trends]  # fmt: skip
+        return np.array([0.0 if one in had else size
+                         for one, size in zip(self.trends, own, strict=True)])  # fmt: skip

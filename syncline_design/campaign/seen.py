@@ -14,7 +14,7 @@ from syncline_design.campaign.pool import Term, inverted
 from syncline_design.campaign.possible_changes import PossibleChange
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.trends import trends
-from syncline_design.campaign.what_changed import Taken, what_changed
+from syncline_design.campaign.what_changed import Taken, possible_beside, what_changed
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -51,7 +51,18 @@ def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, 
         weakest = min(range(len(told)), key=lambda k: _explained(fitted[k]))
         if _explained(fitted[weakest]) >= threshold:
             seen = [_seen(changes, told, k, fitted, first) for k in range(len(told))]
-            return tuple(_with_ends(seen))
+            ones = [one.one for one in told]
+            possible = possible_beside(changes, fitted, count)
+            named = [
+                replace(
+                    one,
+                    others=tuple(
+                        (changes.terms[i], worse) for i, worse in possible.rivals(ones, k)
+                    ),
+                )
+                for k, one in enumerate(seen)
+            ]
+            return tuple(_with_ends(named))
         if len(told) == 1:
             return (_went_back(changes, told[0], first),)
         told.pop(weakest)
@@ -84,7 +95,7 @@ def _went_back(changes: Changes, told: Taken, first: int) -> Seen:
     """A change for which by now nothing speaks, as it was when it rang."""
     one = told.one
     look = max(first, one.trend.k + 1)
-    best = changes.change(look, trends(look).index(one.trend), one.effect)
+    best = changes.change(look, trends(look).index(one.trend.begun), one.effect)
     return _dated(changes, look, told, best, first)
 
 
@@ -112,6 +123,8 @@ def _dated(changes: Changes, look: int, told: Taken, best: Change, first: int) -
     each = np.logaddexp.reduce(changes.gains(look), axis=0)
     others = [(changes.terms[i], float(each[c] - each[i])) for i in np.argsort(-each)
               if i != c and each[i] > each[c] - RIVAL_NATS]  # fmt: skip
+    if best.trend.until is not None:  # trends that go on do not date one that ended
+        firsts, near, same = [best.k], [], []
     return Seen(
         best, min(firsts), max(firsts), first, told.log_evidence, tuple(others),
         _apart(best, same, lambda one: 1.0),
@@ -141,7 +154,8 @@ def _together(changes: Changes, ones: Sequence[PossibleChange], look: int) -> li
     With h_i the course of a change over the runs and J_i = sum h_i I[c_i, :],
         N_ij = sum h_i h_j I[c_i, c_j] - J_i S^-1 J_j',   s_i = sum h_i g[c_i] - J_i S^-1 g.
     """
-    known = [changes.single(look, one.effect, one.trend) for one in ones]
+    known = [replace(changes.single(look, one.effect, one.trend.begun), trend=one.trend)
+             for one in ones]  # fmt: skip
     for _ in range(ROUNDS):  # without what is known the runs tell their constants and scatter
         left = _fitted(changes.without(*known), known, look)
         known = [replace(own, values=one.values + own.values)
@@ -166,6 +180,6 @@ def _fitted(changes: Changes, ones: Sequence[Change], look: int) -> list[Change]
     for one in ones:
         at = slice(end, end + one.term.size)
         end += one.term.size
-        factor = float(temper[row[one.trend], place[one.term.label]])
+        factor = float(temper[row[one.trend.begun], place[one.term.label]])
         found.append(replace(one, values=values[at], covariance=factor * inverse[at, at]))
     return found

@@ -29,6 +29,11 @@ class Trend:
     k: int
     until: int | None = None
 
+    @property
+    def begun(self) -> Trend:
+        """The same without its end."""
+        return Trend(self.kind, self.k)
+
     def over(self, count: int) -> Array:
         """h of so many runs, (count,)."""
         since = np.maximum(np.arange(count) - self.k + 1.0, 0.0)

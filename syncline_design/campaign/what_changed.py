@@ -33,6 +33,8 @@ MOST_CHANGES: Final = 8
 ROUNDS: Final = 2
 MOST_TRIED: Final = 60  # likeliest firsts of two that are tried in the place of one
 MOST_MOVES: Final = 12
+MOST_LATER: Final = 4  # runs by which a drift that ended may have begun later than one that goes on
+MOST_ENDS: Final = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,7 @@ def what_changed(changes: Changes, first: int, threshold: float) -> tuple[Taken,
             at = look if changes.gains(look).max() >= threshold else first
         elif found and total < threshold:
             only = {one.trend for one in found}
-            total = state.of_one_day(at, [trends(at).index(one) for one in only])
+            total = state.of_one_day(at, [trends(at).index(one.begun) for one in only])
             if total < threshold:
                 break
         one = _next(changes, fitted, found, at, only)
@@ -88,7 +90,7 @@ def _next(
     if not found:
         gains = changes.gains(at)
         return _commonest(changes, trends(at), gains)
-    possible = _possible(changes, fitted, at)
+    possible = possible_beside(changes, fitted, at)
     gains = possible.gains(found)
     if only is not None:
         gains[[one not in only for one in possible.trends]] = -math.inf
@@ -104,10 +106,11 @@ def _fits(
     """What was found, fitted together; before: as it was known, the constants told without it."""
     known = {(one.term.label, one.trend): one for one in before}
     labels = [(changes.terms[one.effect].label, one.trend) for one in found]
-    first = [known.get(label) or changes.single(look, one.effect, one.trend)
+    first = [known.get(label) or changes.single(look, one.effect, one.trend.begun)
              for label, one in zip(labels, found, strict=True)]  # fmt: skip
     for _ in range(ROUNDS):
-        first = PossibleChanges(changes, look, (), tuple(first)).values(found)
+        off, needed = tuple(first), tuple(one.trend for one in found)
+        first = PossibleChanges(changes, look, (), off, needed).values(found)
     return first
 
 
@@ -121,7 +124,7 @@ def _held_against_others(
     it, and taken where nothing that differs is left.
     """
     look = changes.pool.count
-    usual = _possible(changes, fitted, look)
+    usual = possible_beside(changes, fitted, look)
     if usual.freed:
         plain = refined(replace(usual, freed=()), found)
         left = changes.without(*_fits(changes, fitted, plain, look))
@@ -130,11 +133,12 @@ def _held_against_others(
     return refined(usual, found)
 
 
-def _possible(changes: Changes, fitted: Sequence[Change], look: int) -> PossibleChanges:
+def possible_beside(changes: Changes, fitted: Sequence[Change], look: int) -> PossibleChanges:
     """What could have changed; effects are free in every run that differ from one to the next where
     what was found is taken off."""
     left = changes.without(*fitted)
-    return PossibleChanges(changes, look, left.compared(look).freed, tuple(fitted))
+    needed = tuple(one.trend for one in fitted)
+    return PossibleChanges(changes, look, left.compared(look).freed, tuple(fitted), needed)
 
 
 def _commonest(changes: Changes, known: Sequence[Trend], gains: Array) -> PossibleChange:
@@ -149,13 +153,14 @@ def refined(possible: PossibleChanges, found: Sequence[PossibleChange]) -> list[
     """The same, each held against what could be in its place."""
     kept = list(found)
     for _ in range(MOST_MOVES):
+        possible = possible.knowing(kept)
         moves = [move for k in range(len(kept)) for move in _instead(possible, kept, k)]
-        moves += _one_for_two(possible, kept)
+        moves += [*_one_for_two(possible, kept), *_ended(possible, kept)]
         better = [move for move in moves if len(move[1]) <= MOST_CHANGES]
         if not better:
             break
         kept = max(better, key=lambda move: move[0])[1]
-    return _named(possible, kept)
+    return _named(possible.knowing(kept), kept)
 
 
 def _named(possible: PossibleChanges, found: Sequence[PossibleChange]) -> list[PossibleChange]:
@@ -202,6 +207,33 @@ def _one_for_two(
         if float(gains.max()) >= float(both):
             one = _commonest(possible.changes, possible.trends, gains)
             yield float(gains.max() - both), [*rest, one]
+
+
+def _ended(
+    possible: PossibleChanges, found: Sequence[PossibleChange]
+) -> Iterator[tuple[float, list[PossibleChange]]]:
+    """Sets in which a drift ended."""
+    for k, one in enumerate(found):
+        if one.trend.kind != "drift":
+            continue
+        first = one.trend.k
+        ends = [
+            Trend("drift", begun, until)
+            for begun in range(max(first - 1, 1), first + MOST_LATER)
+            for until in _spread(begun + 2, possible.look)
+        ]
+        needed = (*(other.trend for other in found), *ends)
+        narrow = replace(possible, needed=needed, only=True)
+        gains = narrow.gains([other for at, other in enumerate(found) if at != k])[:, one.effect]
+        own, best = gains[narrow.trends.index(one.trend)], int(np.argmax(gains))
+        trend = narrow.trends[best]
+        if trend.until is not None and gains[best] > own + AS_GOOD_NATS:
+            yield float(gains[best] - own), [*found[:k], replace(one, trend=trend), *found[k + 1 :]]
+
+
+def _spread(first: int, end: int) -> Iterator[int]:
+    """Places from the first to before the end, so many at most."""
+    yield from dict.fromkeys(map(int, np.linspace(first, end - 1, MOST_ENDS).round()))
 
 
 def _likeliest(gains: Array) -> Iterator[tuple[int, int]]:
