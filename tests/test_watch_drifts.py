@@ -262,3 +262,25 @@ def test_one_trend_is_told_where_two_explain_no_more() -> None:
         (one,) = refined(PossibleChanges(changes, 10, (), known), two)
         assert (one.effect, one.trend.kind) == (latency, "drift")
         assert one.trend.k in (1, 2)
+
+
+def test_whatever_changed_is_told_at_every_look() -> None:
+    """Drifts that begin late, end early, go back, beside steps: what is told has a place among the
+    runs, at every look that rang."""
+    told_at = 0
+    for seed in range(12):
+        rng = np.random.default_rng([68, seed])
+        begun, ended, stepped = (int(k) for k in rng.integers(1, 9, 3))
+        runs = []
+        for k in range(9):
+            drift = 5.0 * max(min(k, ended) - begun + 1, 0)
+            moved = np.array([drift, 9.0 * (k >= stepped), 0, 0, 0]) * BOUND
+            runs.append(statistics(rng, moved, 0.6))
+        for look in range(4, 10):
+            for one in seen_in(runs[:look]):
+                told_at += 1
+                assert 1 <= one.low <= one.change.k <= one.high < look
+                until = one.change.trend.until
+                assert until is None or one.change.k < until < look
+                assert np.all(np.isfinite(one.change.values))
+    assert told_at > 40

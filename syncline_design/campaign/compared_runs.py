@@ -23,16 +23,18 @@ CREDIBLE: Final = 0.95
 @dataclass(frozen=True, eq=False)
 class ComparedRuns:
     """Runs of one baseline, in the order in which they are compared; threshold: log of the evidence
-    [nat] that rings."""
+    [nat] that rings.  apart: places of runs that keep their place and say nothing here."""
 
     stored: Stored
     runs: tuple[Entry, ...]
     threshold: float
+    apart: tuple[int, ...] = ()
 
     @cached_property
     def pool(self) -> Pool:
         entries = self.runs or self.stored.entries[-1:]
-        return pool_of([e.found for e in entries], [e.start for e in entries])
+        whole = pool_of([e.found for e in entries], [e.start for e in entries])
+        return whole.silent(self.apart) if self.apart else whole
 
     @property
     def evidence(self) -> Array:
@@ -46,7 +48,9 @@ class ComparedRuns:
 
     def _keys(self, runs: Sequence[Entry]) -> tuple[str, ...]:
         listed = [self.pool.labels, [term.label for term in self.pool.terms]]
-        return tuple(keys_of(listed, [entry.line for entry in runs]))
+        apart = {self.runs[k].number for k in self.apart}
+        lines = [entry.line + (" apart" if entry.number in apart else "") for entry in runs]
+        return tuple(keys_of(listed, lines))
 
     @cached_property
     def kept(self) -> tuple[KeptLook, ...]:

@@ -115,6 +115,15 @@ class Pool:
             return np.zeros(self.count, dtype=np.int64)
         return self.starts if scope == "start" else np.arange(self.count)
 
+    def silent(self, places: Sequence[int]) -> Pool:
+        """The same, some of the logs saying nothing."""
+        heard = np.ones(self.count)
+        heard[list(places)] = 0.0
+        whole = heard[:, None, None]
+        less = tuple(() if k in places else own for k, own in enumerate(self.less))
+        return Pool(self.labels, self.normal * whole, self.score * heard[:, None],
+                    self.gram * whole, less, self.starts)  # fmt: skip
+
     def part(self, rows: Index) -> Pool:
         """Some of the logs."""
         return Pool(

@@ -28,6 +28,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 RIVAL_NATS: Final = 3.0
+MOST_RIVALS: Final = 6
 TOLD: Final = 3.0  # standard uncertainties from which a parameter is told
 MOST_TRENDS: Final = 40  # the likeliest of all that so many runs have
 
@@ -149,7 +150,7 @@ class PossibleChanges:
             for i in set(worse) - {other.effect for other in found}:
                 worse[i] = min(worse[i], self._in_place_of_one(found, k, i))
         near = [(i, by) for i, by in worse.items() if i != one.effect and by < RIVAL_NATS]
-        return sorted(near, key=lambda pair: pair[1])
+        return sorted(near, key=lambda pair: pair[1])[:MOST_RIVALS]
 
     def _in_place_of_one(self, found: Sequence[PossibleChange], k: int, effect: int) -> float:
         """How much less [nat] a set explains with an effect in the place of a parameter of another

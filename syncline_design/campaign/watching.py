@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -38,7 +38,13 @@ from syncline_design.campaign.store import (
     refused,
 )
 from syncline_design.campaign.strangers import RATE as STRANGER_RATE
-from syncline_design.campaign.strangers import Stranger, strangers
+from syncline_design.campaign.strangers import (
+    Stranger,
+    departures_of,
+    limit_of,
+    part_of,
+    strangers,
+)
 from syncline_design.campaign.telling import estimates
 from syncline_design.campaign.trends import Trend
 from syncline_design.campaign.watch_result import (
@@ -198,8 +204,24 @@ class Watching:
         """The runs but for those."""
         if not self.alone:
             return self.every
-        runs = tuple(e for k, e in enumerate(self.ordered) if k not in self.alone)
-        return ComparedRuns(self.stored, runs, self.every.threshold)
+        return ComparedRuns(self.stored, self.ordered, self.every.threshold, self.alone)
+
+    @cached_property
+    def unlike_others(self) -> tuple[Stranger, ...]:
+        """The strange runs by what they are another in beside what the others say that changed: of
+        an effect that drifts, they have it otherwise than a drift would."""
+        changes = self.every.changes
+        seen = [one.change for one in self.rest.seen]
+        if not seen:
+            return self.strange
+        limit, odd = limit_of(changes), [one.run for one in self.strange]
+        left, found = changes.without(*seen), []
+        for one in self.strange:
+            rows = np.array([k for k in range(len(self.ordered)) if k == one.run or k not in odd])
+            at = int(np.flatnonzero(rows == one.run)[0])
+            told = departures_of(part_of(left, rows), at, limit)
+            found.append(replace(one, departures=told or one.departures))
+        return tuple(found)
 
     @property
     def fresh(self) -> tuple[KeptLook, ...]:
@@ -260,7 +282,7 @@ class Watching:
 
     def _unlike(self) -> Iterator[UnlikeOthers]:
         """Runs that are unlike the others, but for those that a change explains."""
-        for stranger in self.strange:
+        for stranger in self.unlike_others:
             if self._is_explained(stranger):
                 continue
             entry = self.ordered[stranger.run]
@@ -287,7 +309,7 @@ class Watching:
         if first is None or not self.alone:
             return
         evidence = float(self.every.evidence[first - 2])
-        for one in (s for s in self.strange if s.run in self.alone):
+        for one in (s for s in self.unlike_others if s.run in self.alone):
             for departure in one.departures:
                 change = Change(departure.term, Trend("step", one.run), departure.judged.values,
                                 departure.judged.model, evidence)  # fmt: skip
@@ -321,8 +343,8 @@ class Watching:
     def _runs(self) -> Iterator[WatchedRun]:
         """Every run of every baseline, with what it tells alone beside what is named."""
         place = {e.number: k for k, e in enumerate(self.ordered)}
-        looks = {e.number: k for k, e in enumerate(self.rest.runs)}
-        seen = [self._among_all(one.change, place) for one in self.rest.seen]
+        looks = {e.number: k for k, e in enumerate(self.rest.runs) if k not in self.alone}
+        seen = [one.change for one in self.rest.seen]
         values = run_values(self.every.changes, seen, RATE, self.alone)
         for entry in self.stored.entries:
             k, look = place.get(entry.number), looks.get(entry.number)
@@ -342,11 +364,6 @@ class Watching:
                 left_out=True if entry.number in self.stored.left_out else None,
                 checks=entry.run.checks or None,
             )
-
-    def _among_all(self, change: Change, place: Mapping[int, int]) -> Change:
-        """A change that the rest of the runs show, by its place among all."""
-        at = place[self.rest.runs[change.k].number]
-        return replace(change, trend=replace(change.trend, k=at))
 
     def _told(self, one: RunParameter) -> RunValue:
         term, half = one.term, None if one.spread is None else NORMAL_95 * one.spread

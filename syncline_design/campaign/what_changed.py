@@ -219,7 +219,7 @@ def _ended(
         first = one.trend.k
         ends = [
             Trend("drift", begun, until)
-            for begun in range(max(first - 1, 1), first + MOST_LATER)
+            for begun in range(max(first - 1, 1), min(first + MOST_LATER, possible.look - 2))
             for until in _spread(begun + 2, possible.look)
         ]
         needed = (*(other.trend for other in found), *ends)
