@@ -145,6 +145,24 @@ def test_many_late_rows_are_no_witness_of_each_other(tmp_path: Path) -> None:
     assert abs(one.delay_s - 0.2) < 3.0 * one.spread_s < 0.02
 
 
+def test_late_rows_that_chance_puts_side_by_side_are_single_rows(tmp_path: Path) -> None:
+    """Six of nine in one place are dense enough for a while, in which no delay fits the others."""
+    scattered, dense = here_and_there(0.06, 2), [0, 1, 3, 5, 6, 8]
+
+    def rows(time_s: Array) -> Array:
+        at = scattered(time_s) & ~during(36.0, 44.0)(time_s)
+        at[np.searchsorted(time_s, 40.0) + np.array(dense)] = True
+        return at
+
+    spec, log = mixed(tmp_path, "ranging", 0.2, rows)
+    view, found = looked_at(spec, log)
+    ((one,),) = found
+    assert (one.sensor, one.single) == ("ranging", True)
+    time_s = view.log.time_s - view.log.time_s[0]
+    assert np.sum(during(39.9, 41.2)(time_s[one.rows])) >= len(dense) - 1
+    assert abs(one.delay_s - 0.2) < 3.0 * one.spread_s < 0.02
+
+
 def test_a_delay_that_grows_begins_before_it_is_far_off(tmp_path: Path) -> None:
     """What is left of its beginning would be something else (an arm that comes and goes)."""
     run = world("fixed_wing_circuits", 2, 80.0, 8.0)

@@ -230,7 +230,10 @@ def _found(s: Stands) -> str:
     """What is there, in words that its place follows."""
     if s.frozen:
         oldest = format_duration(rounded(s.values[0], 3))
-        return f"{s.label[1]} repeats one reading, in the end {oldest} old,"
+        what = f"{s.label[1]} repeats one reading"
+        if s.reading:
+            what += f" of its {s.reading}, while its others go on"
+        return f"{what}, in the end {oldest} old,"
     part = of_stretch(s)
     if s.ends is not None:
         unit = next(iter(part.parameters.values())).unit

@@ -21,6 +21,7 @@ from syncline_design.diagnosis.consequence import expected_rms_m
 from syncline_design.diagnosis.episodes import without_episodes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.frozen import frozen
+from syncline_design.diagnosis.frozen_channels import frozen_channels
 from syncline_design.diagnosis.instead import InItsPlace, in_place
 from syncline_design.diagnosis.late_runs import late_runs
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
@@ -180,14 +181,15 @@ def _late(inputs: Measured, view: Scene, data: Data, held: Mask) -> Iterator[Sta
 def _repeated(inputs: Measured, view: Scene, data: Data) -> tuple[Stands, ...]:
     time_s, delay = inputs.log.time_s, plain_delay()
     usual_m = max(expected_rms_m(data), 1e-300)
+    whole = frozen(view)
     return tuple(
         Stands(
             (delay.name, each.sensor, each.stage), inputs.system.stages[each.stage].name,
             float(time_s[each.first]), float(time_s[each.last]), (delay.parameters[0].name,),
-            (each.age_s,), (0.0,), -math.inf, True, inside=True, frozen=True,
+            (each.age_s,), (0.0,), -math.inf, True, inside=True, frozen=True, reading=each.reading,
             share=math.sqrt(float(np.sum(each.off_m**2)) / len(time_s)) / usual_m,
         )
-        for each in frozen(view)
+        for each in (*whole, *frozen_channels(view, whole))
     )  # fmt: skip
 
 

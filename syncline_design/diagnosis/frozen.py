@@ -37,7 +37,8 @@ SAME: Final = 1e-9  # of a reading's size, which interpolation between two equal
 @dataclass(frozen=True, slots=True)
 class Frozen:
     """Rows [first, last] that repeat the reading before them: the age of the last one [s], and how
-    far the reading is off in the target's place, row by row [m]."""
+    far the reading is off in the target's place, row by row [m].  reading: which one, where others
+    of the sensor go on; "" of all."""
 
     sensor: ActsOn
     stage: int
@@ -45,6 +46,7 @@ class Frozen:
     last: int
     age_s: float
     off_m: Array
+    reading: str = ""
 
 
 def frozen(view: Scene) -> list[Frozen]:
@@ -53,21 +55,31 @@ def frozen(view: Scene) -> list[Frozen]:
     for index, (stage, logged) in enumerate(zip(view.system.stages, view.log.stages, strict=True)):
         for sensor, reading, sigma, sigma_m in _readings(stage, logged):
             moved_m = _path(view, index, sensor, logged)
-            repeats = _Repeats(view.log.time_s, reading, sigma, moved_m, sigma_m)
-            found += _runs(repeats, sensor, index)
+            repeats = Repeats(view.log.time_s, reading, sigma, moved_m, sigma_m)
+            found += runs(repeats, sensor, index)
     return found
 
 
 @dataclass(frozen=True, slots=True)
-class _Repeats:
+class Repeats:
     """Readings (n, p) along their stamps with their standard deviations (p,), the place that they
-    would have gone through (n, q) [m] and what they scatter at the target [m]."""
+    would have gone through (n, q) [m] and what they scatter at the target [m].  angle: whether
+    both are of one angle in its own unit [rad]."""
 
     time_s: Array
     reading: Array
     sigma: Array
     path: Array
     sigma_m: float
+    angle: bool = False
+
+    def off(self, fresh: int, last: int) -> Array:
+        """How far the course leaves a reading behind in the rows that repeat it."""
+        moved = self.path[fresh + 1 : last + 1] - self.path[fresh]
+        if self.angle:
+            moved = np.remainder(moved + math.pi, 2.0 * math.pi) - math.pi
+        off: Array = np.linalg.norm(moved, axis=1)
+        return off
 
     def last(self, fresh: int, most: int) -> int:
         """The last row up to one that repeats a reading."""
@@ -98,21 +110,22 @@ def _path(view: Scene, index: int, sensor: ActsOn, logged: StageLog) -> Array:
     """Place (n, 3) that a reading would have gone through, so that differences say how far."""
     time_s = view.log.time_s
     reach_m = 1.0 if logged.range_m is None else float(np.median(logged.range_m))
-    place = _summed(time_s, logged.velocity_mps)
-    swung = reach_m * _summed(time_s, logged.rate_radps)
+    place = summed(time_s, logged.velocity_mps)
+    swung = reach_m * summed(time_s, logged.rate_radps)
     if sensor == "position":
         return place
     return swung if sensor == "attitude" else np.hstack([place, swung])
 
 
-def _summed(time_s: Array, slope: Array) -> Array:
+def summed(time_s: Array, slope: Array) -> Array:
     """Integral by the trapezoidal rule, (n, p)."""
     step = np.diff(time_s)[:, None]
     parts = 0.5 * step * (slope[1:] + slope[:-1])
     return np.concatenate([np.zeros((1, slope.shape[1])), np.cumsum(parts, axis=0)])
 
 
-def _runs(of: _Repeats, sensor: ActsOn, stage: int) -> Iterator[Frozen]:
+def runs(of: Repeats, sensor: ActsOn, stage: int) -> Iterator[Frozen]:
+    """Rows that repeat a reading while its course goes on."""
     size = np.maximum(np.abs(of.reading[1:]), 1.0)
     step = np.abs(np.diff(of.reading, axis=0))
     usual = _usual_run(len(of.reading), _side_by_side(np.all(step <= SAME * size, axis=1)))
@@ -121,7 +134,7 @@ def _runs(of: _Repeats, sensor: ActsOn, stage: int) -> Iterator[Frozen]:
         fresh = first
         while fresh < most:
             last = of.last(fresh, most)
-            off = np.linalg.norm(of.path[fresh + 1 : last + 1] - of.path[fresh], axis=1)
+            off = of.off(fresh, last)
             long_enough = last - fresh >= max(LEAST_ROWS, math.ceil(USUAL * usual))
             if long_enough and float(np.max(off)) > MOVED * of.sigma_m:
                 age_s = float(of.time_s[last] - of.time_s[fresh])

@@ -83,22 +83,36 @@ def late_runs(view: Scene, held: Mask) -> list[tuple[Late, ...]]:
     far = (weighed.square > chi_square_limit(FAR, weighed.freedom)) & ~held
     if np.mean(far) > MOST_OF_LOG or np.sum(far) < LEAST_ROWS:
         return []
-    asked = list(_asked(weighed, far, held))
-    found = [tuple(_fits(one)) for one in asked]
-    return [fits for fits in found if fits]
-
-
-def _asked(weighed: Weighed, far: Mask, held: Mask) -> Iterator[LateRows]:
-    """Runs, the longest first, then the rows that are far off in none of them."""
     runs = [one for one in _runs(weighed.time_s, far, held) if _comes_and_goes(weighed, one)]
-    in_runs = np.zeros(len(far), bool)
-    for run in runs:
-        in_runs |= run
+    in_runs = _any_of(runs, far)
+    told: list[Mask] = []
+    found: list[tuple[Late, ...]] = []
     for run in runs[:MOST_RUNS]:
-        yield LateRows(weighed, run, held | (in_runs & ~run))
-    single = far & ~in_runs
-    if LEAST_ROWS <= np.sum(single) <= MOST_SINGLE * len(far):
-        yield LateRows(weighed, single, held | in_runs, single=True)
+        if fits := _fits(LateRows(weighed, run, held | (in_runs & ~run))):
+            told.append(run)
+            found.append(fits)
+    return [*found, *_single(weighed, far, held, (_any_of(told, far), in_runs))]
+
+
+def _single(
+    weighed: Weighed, far: Mask, held: Mask, left_out: Sequence[Mask]
+) -> Iterator[tuple[Late, ...]]:
+    """Rows that are late here and there: of all that no run explains, as chance puts some of them
+    side by side, or else of those that lie in no run at all."""
+    for runs in left_out:
+        single = far & ~runs
+        if not LEAST_ROWS <= np.sum(single) <= MOST_SINGLE * len(far):
+            continue
+        if fits := _fits(LateRows(weighed, single, held | runs, single=True)):
+            yield fits
+            return
+
+
+def _any_of(runs: Sequence[Mask], like: Mask) -> Mask:
+    inside = np.zeros(len(like), bool)
+    for run in runs:
+        inside |= run
+    return inside
 
 
 def _runs(time_s: Array, far: Mask, held: Mask) -> Iterator[Mask]:
@@ -120,11 +134,11 @@ def _comes_and_goes(weighed: Weighed, run: Mask) -> bool:
     return is_inside(float(inside_s[0]), float(inside_s[-1]), weighed.view.log.ends_s)
 
 
-def _fits(asked: LateRows) -> Sequence[Late]:
+def _fits(asked: LateRows) -> tuple[Late, ...]:
     ranged = asked.of.view.log.kind == "georeference"
     devices: tuple[ActsOn, ...] = ("position", "attitude", "ranging") if ranged else ("position",)
     found = [one for sensor in devices if (one := _late(asked, sensor)) is not None]
-    return sorted(found, key=lambda one: one.delay_s < 0.0)
+    return tuple(sorted(found, key=lambda one: one.delay_s < 0.0))
 
 
 def _late(asked: LateRows, sensor: ActsOn) -> Late | None:

@@ -74,7 +74,8 @@ class Stands:
     ends may be off.  share: RMS that it makes in the log, over what the spec's noise makes.
     noise_of: the sensors whose slow noise does there as well; none of a constant beyond doubt.
     explained: the part of the square of what is left there that it makes up.
-    frozen: whether it is one reading that is given over and over, of which the value is the age.
+    frozen: whether it is one reading that is given over and over, of which the value is the age;
+    reading: which of the sensor's, where its others go on.
     ends: of one that grows or falls, what it is at either end; the value is the larger.
     stamps_s: of single rows with sound ones between, those that it acts in.
     """
@@ -97,6 +98,7 @@ class Stands:
     explained: float = 0.0
     ends: tuple[float, float] | None = None
     stamps_s: tuple[float, ...] = ()
+    reading: str = ""
 
     @property
     def others(self) -> tuple[Label, ...]:
