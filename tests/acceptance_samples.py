@@ -27,6 +27,7 @@ from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.instead import InItsPlace
+from syncline_design.diagnosis.noise_split import NoiseFactor, NoiseFactors
 from syncline_design.diagnosis.result import (
     Diagnosis,
     Estimate,
@@ -41,6 +42,12 @@ ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "examples" / "hidden_latency.yaml"
 LATENCY_S = 0.087  # of the position data in the example's log
 ROWS = 1000
+
+
+AS_SPECIFIED = {
+    f"multirotor/{role}": NoiseFactors((NoiseFactor(1.0, 0.99, 1.01),)) for role in
+    ("position", "attitude", "ranging")
+}  # fmt: skip
 
 
 def run(*arguments: object) -> Result:
@@ -79,7 +86,9 @@ def seen_as(found: Diagnosis, short: Path, only: tuple[AssumptionName, ...] = NA
     """What is said of a log whose diagnosis is this one."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(
-            acceptance, "sighted", lambda *_: Sighted(found, instead=instead, ends_s=ends_s)
+            acceptance,
+            "sighted",
+            lambda *_: Sighted(found, instead=instead, ends_s=ends_s, factors=AS_SPECIFIED),
         )
         return accept(load(EXAMPLE), [short], AcceptSettings(only), seed=0)
 

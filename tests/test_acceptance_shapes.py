@@ -103,6 +103,30 @@ def test_noise_beside_a_drift_that_is_undone_keeps_its_interval(found: Diagnosis
     assert "more of it may be there: heading_drift" in row.words
 
 
+def test_noise_that_may_be_another_sensor_s_holds_for_neither(found: Diagnosis) -> None:
+    """The attitude's figure may keep the spec's; then the position has what is beyond it."""
+    told = noisy(found, 1.9)
+    either = NoiseFactors((NoiseFactor(1.43, 0.97, 1.95),), (1.0,), (5e-4, 5e-4, 1e-3))
+    louder = NoiseFactors((NoiseFactor(1.55, 1.22, 1.83),), (1.0,), (0.012, 0.012, 0.02))
+    rows = noise_rows(told, {"attitude": either, "position": louder})
+    assert [row.status for row in rows.values()] == ["not_shown", "not_shown"], rows
+    assert "cannot tell whose" in rows["position"].words
+    sound = noise_rows(told, {"attitude": either, "position": SOUND})["position"]
+    assert "cannot tell whose" not in sound.words
+
+
+def test_noise_without_an_interval_holds_of_no_log(found: Diagnosis) -> None:
+    """Of fewer rows than tell the sensors apart there is a figure, and nothing bounds it."""
+    told = replace(found, findings=(), verdict="agrees")
+    one = row_of("position", "noise")
+    log = LogEvidence(told, OnPaper(load(EXAMPLE), ()), one.stage, sight=Sighted(told))
+    row = by_log(one, log)
+    assert row.status == "not_shown", row
+    assert row.measured is not None
+    assert row.measured.high is None
+    assert "bounds none" in row.words
+
+
 @pytest.mark.parametrize(
     ("seen", "status"),
     [

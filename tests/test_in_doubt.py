@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from syncline_design.comparison.acceptance import MeasuredFigure
-from syncline_design.comparison.in_doubt import Suspicion, likeliest, widened_by
+from syncline_design.comparison.by_log import _with_room
+from syncline_design.comparison.in_doubt import Suspicion, as_size, likeliest, widened_by
 
 
 def _drawn(rng: np.random.Generator, in_part: bool, signed: bool) -> Suspicion:
@@ -91,6 +92,17 @@ def test_what_is_sure_may_be_more() -> None:
     assert told == MeasuredFigure(9.9, 9.7, pytest.approx(30.6))
     assert widened_by(sure, [], signed=True) == sure
     assert widened_by(sure, [other], signed=False) == MeasuredFigure(9.9, 0.0, pytest.approx(30.6))
+
+
+def test_what_others_add_to_a_turn_to_the_left_makes_it_a_size() -> None:
+    """An azimuth of -2.1 mrad that a boresight hides 100 mrad of: no interval of the other sign."""
+    sure, other = MeasuredFigure(-2.1, -2.2, -2.0), Suspicion(((0.6, MeasuredFigure(1, 0.9, 1.1)),))
+    assert widened_by(sure, [other], signed=False) == MeasuredFigure(
+        2.1, pytest.approx(0.9), pytest.approx(3.3)
+    )
+    assert as_size(MeasuredFigure(-2.1, -2.2, 0.1)) == MeasuredFigure(2.1, 0.0, 2.2)
+    assert _with_room(sure, 100.0, signed=False) == MeasuredFigure(2.1, 0.0, 102.1)
+    assert _with_room(sure, 100.0, signed=True) == MeasuredFigure(-2.1, -102.1, 97.9)
 
 
 def test_a_way_without_an_interval_leaves_none() -> None:

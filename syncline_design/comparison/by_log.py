@@ -24,6 +24,7 @@ from syncline_design.comparison.departing import amount, figure_of
 from syncline_design.comparison.in_doubt import (
     InDoubt,
     Suspicion,
+    as_size,
     likeliest,
     widened_by,
 )
@@ -165,9 +166,10 @@ def _with_more(said: Judgement, undone: Sequence[str]) -> str:
 
 
 def _with_room(figure: MeasuredFigure | None, room: float, signed: bool) -> MeasuredFigure | None:
-    value = None if figure is None else figure.value
-    if figure is None or value is None:
+    if figure is None or figure.value is None:
         return None
+    figure = figure if signed else as_size(figure)
+    value = figure.value or 0.0
     if room <= 0.0:
         return MeasuredFigure(value)
     low, high = value - room, value + room

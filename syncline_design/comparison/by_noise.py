@@ -92,7 +92,8 @@ def _others(one: Assumed, log: LogEvidence) -> Iterator[str]:
 
 
 def _of_another(one: Assumed, log: LogEvidence, high: float) -> str:
-    """Noise that is laid on another sensor, which cannot have so much of it."""
+    """Noise that is laid on another sensor, which cannot have so much of it, or of which the log
+    leaves open whether it has any."""
     if high <= FACTOR_LIMIT or log.sight is None:
         return ""
     for f in log.found.findings:
@@ -101,7 +102,9 @@ def _of_another(one: Assumed, log: LogEvidence, high: float) -> str:
             continue
         other = Assumed(f.stage, f.sensor, "noise", 1.0, one.key)
         stated = _stated(other, f, log) if f.material and is_scatter(f) else None
-        if stated is not None and max(part.high for part in own.parts) <= max(1.0, stated[0]):
+        whole = registry()[f.effect].opens == "factor"
+        cannot = stated is not None and max(p.high for p in own.parts) <= max(1.0, stated[0])
+        if cannot or (stated is not None and whole and own.loudest.low <= 1.0):
             return f"{_said(f)}, or those of {one.role}: this log cannot tell whose noise it is"
     return ""
 
@@ -202,6 +205,9 @@ def noise_within(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judg
     """Of noise of which nothing was found: it holds where as much as may be turns no verdict."""
     factor = figure.value or 0.0
     own = log.split(one)
+    if own is None and log.sight is not None:  # nothing tells how far it may be off
+        words = f"{_times(factor)} the spec's figure, and a log of so few rows bounds none"
+        return Judgement("not_shown", words, figure)
     most = max(factor, figure.high or 0.0) if own is None else own.most
     if log.paper.noisier(one.role, one.stage, most):
         words = (f"up to {to_digits(most, 3)} times the spec's figure is nothing unusual on "

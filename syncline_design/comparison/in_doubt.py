@@ -128,10 +128,24 @@ def widened_by(
     if others.low is None or others.high is None:
         return MeasuredFigure(figure.value)
     if not signed:
-        return MeasuredFigure(figure.value, max(figure.low - others.high, 0.0),
-                              figure.high + others.high)  # fmt: skip
+        size, (_, more) = as_size(figure), _sizes_within(others.low, others.high)
+        low, high = size.low or 0.0, size.high or 0.0
+        return MeasuredFigure(size.value, max(low - more, 0.0), high + more)
     return MeasuredFigure(figure.value, figure.low + min(others.low, 0.0),
                           figure.high + max(others.high, 0.0))  # fmt: skip
+
+
+def as_size(figure: MeasuredFigure) -> MeasuredFigure:
+    """How large a departure is, whichever its sign: what others add to is no component any more."""
+    value = None if figure.value is None else abs(figure.value)
+    if figure.low is None or figure.high is None:
+        return MeasuredFigure(value)
+    return MeasuredFigure(value, *_sizes_within(figure.low, figure.high))
+
+
+def _sizes_within(low: float, high: float) -> tuple[float, float]:
+    least = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+    return least, max(abs(low), abs(high))
 
 
 def _of_some(spans: Sequence[tuple[float, float]], signed: bool) -> tuple[float, float]:
