@@ -17,6 +17,8 @@ from syncline_design.comparison.by_noise import (
     noise_open,
     noise_within,
     readings,
+    swaying_words,
+    sways,
 )
 from syncline_design.comparison.by_shift import by_shifts, shifts, widened
 from syncline_design.comparison.by_stretch import SPOKEN_OF
@@ -227,6 +229,8 @@ def _doubt(one: Assumed, log: LogEvidence) -> str:
     if log.sight is not None and log.sight.left_out > SPOKEN_OF:
         share = percent(log.sight.left_out, 2)
         return f"what stands out takes {share} of the log: of so much nothing else is shown"
+    if one.name == "latency" and f"{one.stage}/{one.role}" in sways(log):
+        return swaying_words(one, log)
     if not found.sound:
         first = next(c for c in found.checks if c.severity == "contradiction")
         return f"the log contradicts itself or the spec: {first.message}"

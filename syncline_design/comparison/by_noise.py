@@ -21,7 +21,7 @@ from syncline_design.diagnosis.noise_split import NoiseFactors
 from syncline_design.diagnosis.result import Estimate, Finding
 from syncline_design.effects import registry
 from syncline_design.machine.sentences import or_rivals
-from syncline_design.model.figure_text import percent, to_digits
+from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
 from syncline_design.model.normal import NORMAL_95
 
 _SCATTER: Final = ("factor", "slow", "down", "episode", "tails")  # what noise can be besides white
@@ -59,6 +59,8 @@ def _not_its_own(
     said = _said(breaking[0])
     if not all(is_scatter(f) for f in breaking):
         return ""
+    if f"{one.stage}/{one.role}" in sways(log):
+        return f"{said}, but {swaying_words(one, log)}"
     least = min((span[0] for f in breaking if (span := _stated(one, f, log))), default=1.0)
     if high <= max(1.0, least):
         return (f"{said}, but {one.role} readings scatter {to_digits(high, 3)} times the spec's "
@@ -79,6 +81,21 @@ def _not_its_own(
         return ""
     return (f"{said}, but on this log alone {one.role} readings scatter {to_digits(low, 3)} to "
             f"{to_digits(high, 3)} times the spec's figure: a longer log would tell")  # fmt: skip
+
+
+def sways(log: LogEvidence) -> dict[str, float]:
+    """RMS [s] of the delays that scatter as noise does, of sensors whose noise was found."""
+    known = {} if log.sight is None else log.sight.sways
+    loud = {f"{f.stage}/{f.sensor}" for f in log.found.findings if f.material and is_scatter(f)}
+    return {key: rms_s for key, rms_s in known.items() if key in loud}
+
+
+def swaying_words(one: Assumed, log: LogEvidence) -> str:
+    """What varies along the motion as no noise does."""
+    rms_s = sways(log)[f"{one.stage}/{one.role}"]
+    return (f"{one.role} readings scatter along the motion and by speed, as a delay that varies by "
+            f"{format_duration(rounded(rms_s, 2))} (RMS) does: no noise of a sensor does so, and "
+            "no delay of one value")  # fmt: skip
 
 
 def _others(one: Assumed, log: LogEvidence) -> Iterator[str]:
@@ -103,7 +120,9 @@ def _of_another(one: Assumed, log: LogEvidence, high: float) -> str:
         other = Assumed(f.stage, f.sensor, "noise", 1.0, one.key)
         stated = _stated(other, f, log) if f.material and is_scatter(f) else None
         whole = registry()[f.effect].opens == "factor"
-        cannot = stated is not None and max(p.high for p in own.parts) <= max(1.0, stated[0])
+        key = f"{f.stage}/{f.sensor}"
+        cannot = key in sways(log)
+        cannot |= stated is not None and max(p.high for p in own.parts) <= max(1.0, stated[0])
         if cannot or (stated is not None and whole and own.loudest.low <= 1.0):
             return f"{_said(f)}, or those of {one.role}: this log cannot tell whose noise it is"
     return ""

@@ -44,6 +44,7 @@ from syncline_design.diagnosis.stretches import (
     left_as_one,
     stretches,
 )
+from syncline_design.diagnosis.swaying import swaying
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
 from syncline_design.effects import plain_delay, registry
@@ -81,6 +82,7 @@ class Sighted:
     ends_s: tuple[float, float] | None = None
     course: OneCourse | None = None
     left_out: float = 0.0
+    sways: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def left_in(self) -> tuple[Stands, ...]:
@@ -120,6 +122,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             inputs.log.ends_s,
             left_as_one(one.data, model, one.search.signatures),
             1.0 - len(one.inputs.log) / len(inputs.log),
+            swaying(one.data, model, one.search.signatures, one.search.unlike or ()),
         )
 
 

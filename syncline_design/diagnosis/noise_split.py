@@ -84,11 +84,8 @@ def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[
     split = _parts(data, unlike)
     if len(data.view) < LEAST_ROWS or not split or not data.axes:
         return {}
-    axes = list(data.axes)
-    error = np.nan_to_num(model.error)[:, axes]
-    parts = np.stack([_on(one.covariance, axes) for one in split])
-    whole = white_covariance(data.structure, as_specified(data.structure))
-    fixed = _on(whole, axes) - parts.sum(0)
+    error = np.nan_to_num(model.error)[:, list(data.axes)]
+    _, parts, fixed = components(data, unlike)
     values, spread = estimated(error, parts, fixed)
     slow = np.array([_of_slow(data, model, one) for one in split])
     reach = np.hypot(spread, NORMAL_95 * slow)
@@ -98,6 +95,14 @@ def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[
         factor = NoiseFactor(_root(v), _root(v - r), _root(v + r), names if len(names) < 3 else ())
         found.setdefault(one.sensor, []).append((factor, _share(data, one)))
     return {"/".join(key): _loudest_first(own, _sigma(data, key)) for key, own in found.items()}
+
+
+def components(data: Data, unlike: Sequence[Unlike]) -> tuple[tuple[SensorKey, ...], Array, Array]:
+    """Sensors of the readings that have a factor, C_a (m, n, k, k) of each and F (n, k, k) [m2]."""
+    split, axes = _parts(data, unlike), list(data.axes)
+    parts = np.stack([_on(one.covariance, axes) for one in split])
+    whole = white_covariance(data.structure, as_specified(data.structure))
+    return tuple(one.sensor for one in split), parts, _on(whole, axes) - parts.sum(0)
 
 
 def estimated(error: Array, parts: Array, fixed: Array) -> tuple[Array, Array]:
