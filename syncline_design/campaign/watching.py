@@ -185,9 +185,21 @@ class Watching:
 
     @cached_property
     def standing(self) -> StandingAlone:
-        """Runs that are unlike all the others, and which of them stand alone."""
-        found = strangers(self.every.changes) if self.ordered else ()
-        return standing(self.every.changes, found)
+        """Runs that are unlike all the others, and which of them stand alone.
+
+        What is strange without the likeliest change is one odd run among runs that change; what a
+        change alone makes so is looked at by all runs.
+        """
+        if not self.ordered:
+            return StandingAlone((), ())
+        changes = self.every.changes
+        likely = changes.likeliest(len(self.ordered)) if len(self.ordered) > 1 else None
+        if likely is not None:
+            left = changes.without(likely)
+            found = standing(left, strangers(left))
+            if found.alone:
+                return found
+        return standing(changes, strangers(changes))
 
     @property
     def strange(self) -> tuple[Stranger, ...]:
