@@ -270,6 +270,36 @@ def test_several_changes_of_one_day_are_told_once_each_with_their_uncertainty(
     assert 0.75 < float(np.sqrt(np.mean(np.square(off)))) < 1.2
 
 
+def test_an_odd_run_among_runs_that_drift_is_told_by_what_it_has(
+    spec: Path, tmp_path: Path
+) -> None:
+    """A latency that drifts by 4 bounds a run from run 2 on, and run 5 another vehicle's: latency
+    -40 bounds off that line, range bias 25.  The run is told so, by its own figures, and the drift
+    with its rate by run, the odd one counted as one."""
+    off = []
+    for seed in range(6):
+        rng = np.random.default_rng([26, seed])
+        base = 20.0 * BOUND * rng.standard_normal(len(LABELS))
+        runs = []
+        for k in range(9):
+            moved = np.array([4.0 * k, 0, 0, 0, 0]) + (k == 4) * np.array([-40.0, 25.0, 0, 0, 0])
+            runs.append(run_of(statistics(rng, base + moved * BOUND, 0.9), k))
+        found = told(spec, kept(spec, tmp_path, runs), tmp_path, 1)
+        assert {one["number"] for one in found["unlike"]} == {5}
+        assert {one["effect"] for one in found["unlike"]} == {"latency", "range_bias"}
+        for one, true in zip(sorted(found["unlike"], key=lambda one: one["effect"]),
+                             (-40.0 * BOUND[0], 25.0 * BOUND[1]), strict=True):  # fmt: skip
+            (own,) = one["differs"].values()
+            off.append((own["value"] - true) / own["standard_uncertainty"])
+        (alarm,) = found["alarms"]
+        assert alarm["effect"] == "latency"
+        rate, sigma = (alarm["drift"][key] for key in ("per_run", "standard_uncertainty"))
+        assert abs(rate - 4.0 * BOUND[0]) < 4.0 * sigma
+        assert alarm["change"] == pytest.approx((9 - alarm["since"]["run"] + 1) * rate)
+        (tmp_path / "store.jsonl").unlink()
+    assert max(map(abs, off)) < 4.0
+
+
 def test_a_weaker_effect_of_the_same_day_is_told_beside_the_first(tmp_path: Path) -> None:
     """A latency by 40 bounds, and the range bias by 7 with the same run, three runs before it and
     three from it on: too little to ring by itself, as it may be scatter; that day had a change."""

@@ -174,10 +174,17 @@ class PossibleChanges:
 
     def _weights(self, beside: Sequence[PossibleChange]) -> Array:
         """log of the trends' weights, 0 of those that a change beside has; any end is as likely."""
-        known = dict(zip(trends(self.look), log_weights(self.look), strict=True))
         had = {one.trend for one in beside}
-        ends = math.log(self.look)
-        own = [float(known[one.begun]) - (0.0 if one.until is None else ends)
-               for one in self.trends]  # fmt: skip
-        return np.array([0.0 if one in had else size
-                         for one, size in zip(self.trends, own, strict=True)])  # fmt: skip
+        return np.array([0.0 if one in had else self.weight_of(one) for one in self.trends])
+
+    def weight_of(self, trend: Trend) -> float:
+        """log of a trend's weight; that of a single run is known to be the odd one."""
+        if trend.is_of_one_run:
+            return 0.0
+        ends = 0.0 if trend.until is None else math.log(self.look)
+        return self._known[trend.begun] - ends
+
+    @cached_property
+    def _known(self) -> dict[Trend, float]:
+        pairs = zip(trends(self.look), log_weights(self.look), strict=True)
+        return {trend: float(weight) for trend, weight in pairs}

@@ -22,12 +22,16 @@ DRIFTING: Final = 0.1  # share of the changes that grow from run to run
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """A change from one run on; k: place of the first run that has it; until: of the first that is
-    as the one before, where a drift ended."""
+    """A change from one run on; k: place of the first run that has it; until: of the first that has
+    no more of it, of a drift than the run before, of a step none."""
 
     kind: Kind
     k: int
     until: int | None = None
+
+    @property
+    def is_of_one_run(self) -> bool:
+        return self.kind == "step" and self.until == self.k + 1
 
     @property
     def begun(self) -> Trend:
@@ -37,7 +41,9 @@ class Trend:
     def over(self, count: int) -> Array:
         """h of so many runs, (count,)."""
         since = np.maximum(np.arange(count) - self.k + 1.0, 0.0)
-        if self.until is not None:
+        if self.until is not None and self.kind == "step":
+            since[self.until :] = 0.0
+        elif self.until is not None:
             since = np.minimum(since, float(self.until - self.k))
         found: Array = np.minimum(since, 1.0) if self.kind == "step" else since
         return found

@@ -14,9 +14,11 @@ import numpy as np
 from syncline_design import __version__
 from syncline_design.campaign.adding import content_hash, run_of
 from syncline_design.campaign.alarms import alarms_of, others_of, since_of
+from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.joint import JointError
 from syncline_design.campaign.looks import KeptLook
+from syncline_design.campaign.odd_run import departures_beside
 from syncline_design.campaign.oddities import cautions, unsettled_in
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.run_values import RunParameter, run_values
@@ -38,13 +40,7 @@ from syncline_design.campaign.store import (
     refused,
 )
 from syncline_design.campaign.strangers import RATE as STRANGER_RATE
-from syncline_design.campaign.strangers import (
-    Stranger,
-    departures_of,
-    limit_of,
-    part_of,
-    strangers,
-)
+from syncline_design.campaign.strangers import Stranger, strangers
 from syncline_design.campaign.telling import estimates
 from syncline_design.campaign.trends import Trend
 from syncline_design.campaign.watch_result import (
@@ -222,16 +218,12 @@ class Watching:
     def unlike_others(self) -> tuple[Stranger, ...]:
         """The strange runs by what they are another in beside what the others say that changed: of
         an effect that drifts, they have it otherwise than a drift would."""
-        changes = self.every.changes
-        seen = [one.change for one in self.rest.seen]
-        if not seen:
-            return self.strange
-        limit, odd = limit_of(changes), [one.run for one in self.strange]
-        left, found = changes.without(*seen), []
+        seen, odd = [one.change for one in self.rest.seen], [one.run for one in self.strange]
+        found = []
         for one in self.strange:
-            rows = np.array([k for k in range(len(self.ordered)) if k == one.run or k not in odd])
-            at = int(np.flatnonzero(rows == one.run)[0])
-            told = departures_of(part_of(left, rows), at, limit)
+            others = tuple(run for run in odd if run != one.run)
+            changes = Changes(self.every.pool.silent(others)) if others else self.every.changes
+            told = departures_beside(changes, one.run, seen)
             found.append(replace(one, departures=told or one.departures))
         return tuple(found)
 

@@ -89,12 +89,12 @@ def _next(
     """The likeliest change beside those that are known, of some trends alone where these are."""
     if not found:
         gains = changes.gains(at)
-        return _commonest(changes, trends(at), gains)
+        return commonest(changes, trends(at), gains)
     possible = possible_beside(changes, fitted, at)
     gains = possible.gains(found)
     if only is not None:
         gains[[one not in only for one in possible.trends]] = -math.inf
-    return _commonest(changes, possible.trends, gains)
+    return commonest(changes, possible.trends, gains)
 
 
 def _fits(
@@ -141,7 +141,7 @@ def possible_beside(changes: Changes, fitted: Sequence[Change], look: int) -> Po
     return PossibleChanges(changes, look, left.compared(look).freed, tuple(fitted), needed)
 
 
-def _commonest(changes: Changes, known: Sequence[Trend], gains: Array) -> PossibleChange:
+def commonest(changes: Changes, known: Sequence[Trend], gains: Array) -> PossibleChange:
     """The likeliest change; of those that are as good, the commonest."""
     each = gains.max(axis=0)
     close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
@@ -183,14 +183,14 @@ def _instead(
     gains = possible.gains(rest)
     own = float(gains[possible.trends.index(found[k].trend), found[k].effect])
     if float(gains.max()) > own + AS_GOOD_NATS:
-        one = _commonest(possible.changes, possible.trends, gains)
+        one = commonest(possible.changes, possible.trends, gains)
         yield float(gains.max()) - own, [*rest, one]
     for row, c in itertools.islice(_likeliest(gains), MOST_TRIED):
         first = PossibleChange(c, possible.trends[row])
         second = possible.gains([*rest, first])
         both = float(gains[row, c] + second.max()) - INSTEAD_NATS
         if both > own + AS_GOOD_NATS:
-            yield both - own, [*rest, first, _commonest(possible.changes, possible.trends, second)]
+            yield both - own, [*rest, first, commonest(possible.changes, possible.trends, second)]
 
 
 def _one_for_two(
@@ -205,7 +205,7 @@ def _one_for_two(
         beside = possible.gains([*rest, found[a]])
         both += beside[row(found[b].trend), found[b].effect]
         if float(gains.max()) >= float(both):
-            one = _commonest(possible.changes, possible.trends, gains)
+            one = commonest(possible.changes, possible.trends, gains)
             yield float(gains.max() - both), [*rest, one]
 
 
