@@ -147,7 +147,8 @@ class Changes:
         return float(self.inside(look)[int(np.argmax(first)) % len(self.terms)])
 
     def likelihoods(self, look: int) -> Array:
-        """The same by one noise for all effects, that of the likeliest, so that they compare."""
+        """log w_k w_c B_ck by one noise for all effects, that of the likeliest, so that they
+        compare, each free to have any value besides, (2 (look - 1), C)."""
         runs, freed, noise = self.compared(look), self._free(look), self.noise(look)
         found: Array = log_weights(look)[:, None] + self.log_weights
         return found + self._factors(freed, runs, np.full(len(self.terms), noise))
@@ -357,8 +358,7 @@ class Changes:
         inverse = pseudo_inverse(total)
         left = score
         if likely is not None:
-            made = normal[:, :, likely.term.index] @ likely.values
-            left = score - likely.trend.over(look)[:, None] * made
+            left = score - likely.made(normal)
         left = left - normal @ (inverse @ left.sum(axis=0))
         found = []
         for g in self.groups:
@@ -386,8 +386,7 @@ class Changes:
         """The same runs with changes taken off those that have them."""
         score = self.pool.score.copy()
         for one in ones:
-            made = self.pool.normal[:, :, one.term.index] @ one.values
-            score -= one.trend.over(self.pool.count)[:, None] * made
+            score -= one.made(self.pool.normal)
         return self._of(replace(self.pool, score=score), self.beside)
 
     def taking(self, one: Change) -> Changes:

@@ -83,8 +83,7 @@ class PossibleChanges:
             normal, score = freed_of(normal, score, one.term.index, one.covariance)
         left = score.copy()
         for change in self.off:
-            made = normal[:, :, change.term.index] @ change.values
-            left -= change.trend.over(self.look)[:, None] * made
+            left -= change.made(normal)
         inverse = pseudo_inverse(self.changes.total(self.look, normal, left))
         over = np.array([one.over(self.look) for one in self.trends])
         count, size = len(over), normal.shape[1]

@@ -27,9 +27,10 @@ class Change:
         """Place of the first run that has it."""
         return self.trend.k
 
-    def is_of(self, other: Change) -> bool:
-        """Whether both are of one effect and of one course."""
-        return (self.term.label, self.trend) == (other.term.label, other.trend)
+    def made(self, normal: Array) -> Array:
+        """Scores (L, P) that it makes in runs of information (L, P, P)."""
+        own: Array = normal[:, :, self.term.index] @ self.values
+        return self.trend.over(len(normal))[:, None] * own
 
 
 @dataclass(frozen=True, slots=True)

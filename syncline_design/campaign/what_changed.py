@@ -26,9 +26,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 AS_GOOD_NATS: Final = 2.0
-INSTEAD_NATS: Final = (
-    3.0  # by which two in the place of one explain more, all their freedom counted
-)
+INSTEAD_NATS: Final = 3.0  # by which two in the place of one explain more
 MOST_CHANGES: Final = 8
 ROUNDS: Final = 2
 MOST_TRIED: Final = 60  # likeliest firsts of two that are tried in the place of one
@@ -88,8 +86,7 @@ def _next(
 ) -> PossibleChange:
     """The likeliest change beside those that are known, of some trends alone where these are."""
     if not found:
-        gains = changes.gains(at)
-        return commonest(changes, trends(at), gains)
+        return commonest(changes, trends(at), changes.gains(at))
     possible = possible_beside(changes, fitted, at)
     gains = possible.gains(found)
     if only is not None:
