@@ -11,14 +11,13 @@ import numpy as np
 
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.pool import Term, inverted
-from syncline_design.campaign.possible_changes import PossibleChange
+from syncline_design.campaign.possible_changes import RIVAL_NATS, PossibleChange
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.trends import trends
 from syncline_design.campaign.what_changed import Taken, possible_beside, what_changed
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
-RIVAL_NATS: Final = 3.0
 CREDIBLE: Final = 0.95
 UNDONE: Final = 2.5  # standard uncertainties within which one drift undoes another
 ROUNDS: Final = 3
@@ -51,18 +50,7 @@ def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, 
         weakest = min(range(len(told)), key=lambda k: _explained(fitted[k]))
         if _explained(fitted[weakest]) >= threshold:
             seen = [_seen(changes, told, k, fitted, first) for k in range(len(told))]
-            ones = [one.one for one in told]
-            possible = possible_beside(changes, fitted, count)
-            named = [
-                replace(
-                    one,
-                    others=tuple(
-                        (changes.terms[i], worse) for i, worse in possible.rivals(ones, k)
-                    ),
-                )
-                for k, one in enumerate(seen)
-            ]
-            return tuple(_with_ends(named))
+            return tuple(_with_ends(seen))
         if len(told) == 1:
             return (_went_back(changes, told[0], first),)
         told.pop(weakest)
@@ -96,7 +84,10 @@ def _went_back(changes: Changes, told: Taken, first: int) -> Seen:
     one = told.one
     look = max(first, one.trend.k + 1)
     best = changes.change(look, trends(look).index(one.trend.begun), one.effect)
-    return _dated(changes, look, told, best, first)
+    each = np.logaddexp.reduce(changes.gains(look), axis=0)
+    others = tuple((changes.terms[i], float(each[one.effect] - each[i])) for i in np.argsort(-each)
+                   if i != one.effect and each[i] > each[one.effect] - RIVAL_NATS)  # fmt: skip
+    return _dated(changes, look, told, best, first, others)
 
 
 def _seen(
@@ -107,11 +98,21 @@ def _seen(
     for at, other in enumerate(fitted):
         if at != k:
             rest = rest.taking(other)
-    return _dated(rest, changes.pool.count, told[k], fitted[k], first)
+    count = changes.pool.count
+    rivals = possible_beside(changes, fitted, count).rivals([one.one for one in told], k)
+    others = tuple((changes.terms[i], worse) for i, worse in rivals)
+    return _dated(rest, count, told[k], fitted[k], first, others)
 
 
-def _dated(changes: Changes, look: int, told: Taken, best: Change, first: int) -> Seen:
-    """A change with the runs that may be its first, and the effects that do as well."""
+def _dated(
+    changes: Changes,
+    look: int,
+    told: Taken,
+    best: Change,
+    first: int,
+    others: tuple[tuple[Term, float], ...],
+) -> Seen:
+    """A change with the runs that may be its first."""
     known, c = trends(look), told.one.effect
     table = changes.likelihoods(look)[:, c]
     share = np.exp(table - np.logaddexp.reduce(table))
@@ -120,13 +121,10 @@ def _dated(changes: Changes, look: int, told: Taken, best: Change, first: int) -
     near = [(changes.change(look, int(k), c), float(share[k])) for k in needed]
     same = [(one, own) for one, own in near if one.trend.kind == best.trend.kind]
     firsts = [known[k].k for k in needed] + [best.k]
-    each = np.logaddexp.reduce(changes.gains(look), axis=0)
-    others = [(changes.terms[i], float(each[c] - each[i])) for i in np.argsort(-each)
-              if i != c and each[i] > each[c] - RIVAL_NATS]  # fmt: skip
     if best.trend.until is not None:  # trends that go on do not date one that ended
         firsts, near, same = [best.k], [], []
     return Seen(
-        best, min(firsts), max(firsts), first, told.log_evidence, tuple(others),
+        best, min(firsts), max(firsts), first, told.log_evidence, others,
         _apart(best, same, lambda one: 1.0),
         _apart(best, near, lambda one: float(one.trend.over(look)[-1])),
     )  # fmt: skip
