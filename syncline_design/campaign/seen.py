@@ -147,37 +147,12 @@ def _explained(change: Change) -> float:
 
 
 def _together(changes: Changes, ones: Sequence[PossibleChange], look: int) -> list[Change]:
-    """Several changes fitted at once to the first `look` runs, by the scatter that they leave.
-
-    With h_i the course of a change over the runs and J_i = sum h_i I[c_i, :],
-        N_ij = sum h_i h_j I[c_i, c_j] - J_i S^-1 J_j',   s_i = sum h_i g[c_i] - J_i S^-1 g.
-    """
+    """Several changes fitted at once to the first `look` runs, by the scatter that they leave."""
     known = [replace(changes.single(look, one.effect, one.trend.begun), trend=one.trend)
              for one in ones]  # fmt: skip
     for _ in range(ROUNDS):  # without what is known the runs tell their constants and scatter
-        left = _fitted(changes.without(*known), known, look)
-        known = [replace(own, values=one.values + own.values)
-                 for one, own in zip(known, left, strict=True)]  # fmt: skip
-    return known
-
-
-def _fitted(changes: Changes, ones: Sequence[Change], look: int) -> list[Change]:
-    runs, temper = changes.compared(look), changes.temper(look)
-    over = [one.trend.over(look) for one in ones]
-    index = [one.term.index for one in ones]
-    across = np.concatenate([np.tensordot(h, runs.normal[:, own], axes=1)
-                             for h, own in zip(over, index, strict=True)])  # fmt: skip
-    scores = np.concatenate([h @ runs.score[:, own] for h, own in zip(over, index, strict=True)])
-    both = [[np.tensordot(over[i] * over[j], runs.normal[:, index[i][:, None], index[j]], axes=1)
-             for j in range(len(ones))] for i in range(len(ones))]  # fmt: skip
-    inverse = inverted(np.block(both) - across @ runs.inverse @ across.T)
-    values = inverse @ (scores - across @ (runs.inverse @ runs.score.sum(axis=0)))
-    place = {term.label: k for k, term in enumerate(changes.terms)}
+        temper = changes.without(*known).temper(look)
+        known = possible_beside(changes, known, look).values(ones)
     row = {trend: k for k, trend in enumerate(trends(look))}
-    found, end = [], 0
-    for one in ones:
-        at = slice(end, end + one.term.size)
-        end += one.term.size
-        factor = float(temper[row[one.trend.begun], place[one.term.label]])
-        found.append(replace(one, values=values[at], covariance=factor * inverse[at, at]))
-    return found
+    return [replace(own, covariance=temper[row[one.trend.begun], one.effect] * own.covariance)
+            for one, own in zip(ones, known, strict=True)]  # fmt: skip
