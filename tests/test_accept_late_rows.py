@@ -19,7 +19,7 @@ from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.spec.load import load
 from tests.test_accept_stretches import world
-from tests.world import Hidden, Noise, hidden, make_log
+from tests.world import Hidden, Noise, Scenario, hidden, make_log
 from tests.world.trajectory import Array
 from tests.world.worldlog import write_columns
 
@@ -114,18 +114,23 @@ def test_single_rows_that_are_late_are_no_noise(device: str, tmp_path: Path) -> 
     assert "single rows" in text
 
 
-def test_a_delay_that_grows_is_told_by_the_largest_that_acted(tmp_path: Path) -> None:
-    """From nothing to 0.6 s in half a minute; its mean acted nowhere long."""
-    run = world(*RUN)
+def growing(folder: Path, run: Scenario, from_s: float, most_s: float) -> tuple[Path, Path]:
+    """A spec and a log whose places are late from then on, by more and more for half a minute."""
     sound = make_log(run)
     time_s = sound.columns["time_s"] - sound.columns["time_s"][0]
-    delay_s = np.where((time_s > 20.0) & (time_s < 50.0), (time_s - 20.0) / 30.0 * 0.6, 0.0)
+    since = time_s - from_s
+    delay_s = np.where((since > 0.0) & (since < 30.0), since / 30.0 * most_s, 0.0)
     columns = dict(sound.columns)
     for name in OF["position"]:
         columns[name] = np.interp(time_s - delay_s, time_s, columns[name])
-    spec = tmp_path / "spec.yaml"
+    spec = folder / "spec.yaml"
     spec.write_text(sound.spec_yaml(), "utf-8")
-    log = write_columns(tmp_path / "log.csv", columns)
+    return spec, write_columns(folder / "log.csv", columns)
+
+
+def test_a_delay_that_grows_is_told_by_the_largest_that_acted(tmp_path: Path) -> None:
+    """From nothing to 0.6 s in half a minute; its mean acted nowhere long."""
+    spec, log = growing(tmp_path, world(*RUN), 20.0, 0.6)
     _, found = looked_at(spec, log)
     assert all(one.sensor == "position" for (one,) in found)
     assert any(one.ends_s is not None for (one,) in found)
@@ -166,15 +171,8 @@ def test_late_rows_that_chance_puts_side_by_side_are_single_rows(tmp_path: Path)
 def test_a_delay_that_grows_begins_before_it_is_far_off(tmp_path: Path) -> None:
     """What is left of its beginning would be something else (an arm that comes and goes)."""
     run = world("fixed_wing_circuits", 2, 80.0, 8.0)
-    sound = make_log(run)
-    time_s = sound.columns["time_s"] - sound.columns["time_s"][0]
-    delay_s = np.where((time_s > 30.0) & (time_s < 60.0), (time_s - 30.0) / 30.0 * 0.3, 0.0)
-    columns = dict(sound.columns)
-    for name in OF["position"]:
-        columns[name] = np.interp(time_s - delay_s, time_s, columns[name])
-    spec = tmp_path / "spec.yaml"
-    spec.write_text(sound.spec_yaml(), "utf-8")
-    _, found = looked_at(spec, write_columns(tmp_path / "log.csv", columns))
+    view, found = looked_at(*growing(tmp_path, run, 30.0, 0.3))
+    time_s = view.log.time_s - view.log.time_s[0]
     ((one,),) = found
     assert one.ends_s is not None
     assert one.ends_s[0] == pytest.approx(0.0, abs=0.01)

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects.kinematics import within_half_a_turn
 from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.log import StageLog
 from syncline_design.machine.quick_dataclass import dataclass
@@ -77,7 +78,7 @@ class Repeats:
         """How far the course leaves a reading behind in the rows that repeat it."""
         moved = self.path[fresh + 1 : last + 1] - self.path[fresh]
         if self.angle:
-            moved = np.remainder(moved + math.pi, 2.0 * math.pi) - math.pi
+            moved = within_half_a_turn(moved)
         off: Array = np.linalg.norm(moved, axis=1)
         return off
 

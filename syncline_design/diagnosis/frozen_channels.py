@@ -14,7 +14,6 @@ elsewhere nine of ten readings are nearer to it than half of what the one that h
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
@@ -23,7 +22,7 @@ import numpy as np
 
 from syncline_design.diagnosis.frozen import Frozen, Repeats, runs, summed
 from syncline_design.diagnosis.scene import Scene, levers
-from syncline_design.effects.kinematics import euler_to_rotation, rotate
+from syncline_design.effects.kinematics import euler_to_rotation, rotate, within_half_a_turn
 from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.log import StageLog
 from syncline_design.machine.quick_dataclass import dataclass
@@ -52,7 +51,7 @@ class _Channel:
         """How far readings that many rows apart are from the course between them."""
         moved = self.reading[rows:] - self.reading[:-rows]
         off = moved - (self.course[rows:] - self.course[:-rows])
-        return np.abs(_turned(off) if self.angle else off)
+        return np.abs(within_half_a_turn(off) if self.angle else off)
 
 
 def frozen_channels(view: Scene, whole: Sequence[Frozen]) -> Iterator[Frozen]:
@@ -133,9 +132,3 @@ def _euler_rates(logged: StageLog) -> Array:
     steep = np.maximum(np.abs(np.cos(pitch)), 1e-3) * np.where(np.cos(pitch) < 0.0, -1.0, 1.0)
     rates = (p + level * np.sin(pitch) / steep, q * np.cos(roll) - r * np.sin(roll), level / steep)
     return np.stack(rates, axis=1)
-
-
-def _turned(angle: Array) -> Array:
-    """Angles within half a turn."""
-    within: Array = np.remainder(angle + math.pi, 2.0 * math.pi) - math.pi
-    return within

@@ -22,6 +22,12 @@ def bearing(azimuth_rad: Array, elevation_rad: Array) -> Array:
     return found
 
 
+def within_half_a_turn(angle_rad: Array) -> Array:
+    """Angles [rad] of any shape, from -pi to below pi."""
+    found: Array = np.remainder(angle_rad + np.pi, 2.0 * np.pi) - np.pi
+    return found
+
+
 def cross(a: Array, b: Array) -> Array:
     """a x b row by row, (n, 3) or (3,) each; for few rows in a third of numpy's time."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
