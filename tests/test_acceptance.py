@@ -43,6 +43,7 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import load
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 from tests.acceptance_samples import (
+    AS_SPECIFIED,
     EXAMPLE,
     LATENCY_S,
     ROOT,
@@ -284,6 +285,18 @@ def test_a_wave_that_is_no_effect_leaves_the_rows_open(found: Diagnosis) -> None
     wave = replace(found.findings[0], effect="spectral_line", kind="stand_in", aliases=())
     rows = dict(judged(load(EXAMPLE), replace(found, findings=(wave,))))
     assert {one.status for key, one in rows.items() if key[0] != "platform"} == {"not_shown"}
+
+
+def test_a_wave_of_one_sensor_is_no_noise_that_another_may_have(found: Diagnosis) -> None:
+    """Where the split leaves a sensor room for more noise: it was an internal error as well."""
+    case = load(EXAMPLE)
+    wave = replace(found.findings[0], effect="spectral_line", kind="stand_in", aliases=())
+    waved = replace(found, findings=(wave,))
+    loud = {key: NoiseFactors((NoiseFactor(1.0, 0.4, 1.6),)) for key in AS_SPECIFIED}
+    log = LogEvidence(waved, OnPaper(case, ()), "multirotor", sight=Sighted(waved, factors=loud))
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    rows = [by_log(one, log) for one in assumptions(case, verdict) if one.name == "noise"]
+    assert {row.status for row in rows} == {"not_shown"}
 
 
 def test_a_delay_that_several_sensors_share_breaks_each(found: Diagnosis) -> None:

@@ -117,6 +117,8 @@ def _of_another(one: Assumed, log: LogEvidence, high: float) -> str:
         own = log.sight.factors.get(f"{f.stage}/{f.sensor}")
         if f.stage != one.stage or f.sensor == one.role or own is None:
             continue
+        if f.effect not in registry():  # a wave is noise of no sensor
+            continue
         other = Assumed(f.stage, f.sensor, "noise", 1.0, one.key)
         stated = _stated(other, f, log) if f.material and is_scatter(f) else None
         whole = registry()[f.effect].opens == "factor"
