@@ -27,7 +27,9 @@ from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
 from syncline_design.model.figure_text import format_estimate, format_nats, to_places
 from syncline_design.model.known import EffectEntry
+from syncline_design.model.normal import NORMAL_95
 
+MUCH = 3.0  # times that undoing a gross fault makes an error smaller
 ONE_VALUE = 0.001  # chance below which a parameter is not one value along the log
 
 
@@ -165,11 +167,30 @@ def _varying(final: Settled, one: Acting) -> tuple[Stretch, ...] | None:
 
 def _gross(view: Scene, fault: Gross) -> Finding:
     effect, label = fault.acting.effect, fault.acting.label
-    found = {p.name: estimate(fault.acting.values[p.name], unit=p.unit) for p in effect.parameters}
+    found = {
+        p.name: _of_gross(fault.acting.values[p.name], fault.spread, p.unit)
+        for p in effect.parameters
+    }
     stage = view.system.stages[label[2]].name
     gain = math.log(fault.falls_by)
-    words = f"undoing it makes the usual error {to_places(math.exp(gain), 0)} times smaller"
-    return finding(effect, label[1], stage, found, words + _of_a_clock(view, fault), gain)
+    words = f"undoing it makes the usual error {_times_smaller(fault.falls_by)}"
+    named = finding(effect, label[1], stage, found, words + _of_a_clock(view, fault), gain)
+    if not fault.readings:
+        return named
+    return replace(named, sentence=f"{named.sentence}, in {fault.readings} alone")
+
+
+def _of_gross(value: float | str, spread: float | None, unit: str) -> Estimate:
+    if spread is None or isinstance(value, str):
+        return estimate(value, unit=unit)
+    half = NORMAL_95 * spread
+    return estimate(value, spread, unit, interval95=(value - half, value + half))
+
+
+def _times_smaller(falls_by: float) -> str:
+    """Of what is not grossly off its noise to a tenth."""
+    places = 0 if falls_by >= MUCH else 1
+    return f"{to_places(falls_by, places)} times smaller"
 
 
 def _of_a_clock(view: Scene, fault: Gross) -> str:

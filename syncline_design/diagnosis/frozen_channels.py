@@ -99,7 +99,7 @@ def _channels(view: Scene, stage: int) -> Iterator[_Channel]:
             yield _Channel("position", name, logged.antenna_m[:, k], course[:, k], sigma, 1.0,
                            angle=False)  # fmt: skip
     if own.attitude is not None:
-        course = summed(view.log.time_s, _euler_rates(logged))
+        course = summed(view.log.time_s, euler_rates(logged))
         for k, name in enumerate(ANGLES):
             reading, sigma = logged.euler_rad[:, k], own.attitude.sigma[k]
             yield _Channel("attitude", name, reading, course[:, k], sigma, reach_m, angle=True)
@@ -123,7 +123,7 @@ def _told_of(seen: Array) -> tuple[Array, Array, Array]:
     return np.linalg.norm(seen, axis=1), np.arctan2(y, x), np.arctan2(-z, np.hypot(x, y))
 
 
-def _euler_rates(logged: StageLog) -> Array:
+def euler_rates(logged: StageLog) -> Array:
     """Of roll, pitch and yaw (n, 3) [rad/s]; source: Stevens and Lewis, Aircraft Control and
     Simulation, eq. 1.4-4."""
     roll, pitch, _ = logged.euler_rad.T

@@ -54,6 +54,8 @@ class Gross:
 
     acting: Acting
     falls_by: float  # usual size of the error before over after
+    spread: float | None = None  # standard uncertainty of its parameter
+    readings: str = ""  # of the sensor's, those that it acts on alone
 
 
 def undone(log: Log, one: Acting) -> Log:

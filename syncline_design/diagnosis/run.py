@@ -26,6 +26,7 @@ from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
+from syncline_design.diagnosis.late_angle import is_far_off, late_angles
 from syncline_design.diagnosis.motion_columns import (
     columns_of,
     contradictions,
@@ -127,6 +128,11 @@ class SearchedLog:
     replaced: tuple[Check, ...] = ()
 
     @property
+    def found_any(self) -> bool:
+        """Whether the log is anything but what the spec says."""
+        return bool(self.result.model.acting or self.result.model.opened)
+
+    @property
     def untouched(self) -> Array | None:
         """The error before the gross faults were undone, where there were any."""
         return untouched_error(self.inputs, self.data) if self.faults else None
@@ -144,12 +150,33 @@ def examined(
         settings.exclude_effects,
         inputs.reread,
     )
+    few, exclude = _in_windows(log), settings.exclude_effects
+    early = is_far_off(inputs, few)  # where all of a search would be for nothing
+    late = late_angles(inputs, log, few, exclude) if early else None
+    if late is None:
+        one = _settled(inputs, faults, log, settings, progress)
+        if early or not one.found_any:
+            return one
+        late = late_angles(inputs, log, few, exclude)
+        if late is None:
+            return one
+    return _settled(inputs, (*faults, late.fault), late.log, settings, progress)
+
+
+def _settled(
+    inputs: Measured,
+    faults: tuple[Gross, ...],
+    log: Log,
+    settings: DiagnosisSettings,
+    progress: SearchProgress,
+) -> SearchedLog:
+    """Look for what is missing, beside the columns of motion that the poses bear out."""
     view = scene(inputs.system, _in_windows(log), inputs.known)
     wrong = () if is_excusable(view) else contradictions(view)
 
     def asked(wrong: tuple[Check, ...]) -> SearchedLog:
         sloped = with_slopes(log, wrong)
-        return replace(_examined(inputs, tuple(faults), sloped, settings, progress), replaced=wrong)
+        return replace(_examined(inputs, faults, sloped, settings, progress), replaced=wrong)
 
     one = asked(wrong)
     found = contradictions(view, one.result.model.acting)

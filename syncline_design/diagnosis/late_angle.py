@@ -1,0 +1,349 @@
+"""Angles of an attitude of which some are late and the others are not: a heading of two antennas.
+
+The attitude's delay turns all of its angles at once.  Where the heading alone is late by L,
+    yaw(t + L) = what it was at t,
+is in the log, so that the column is put back by looking it up, and what is left is asked for
+everything else.  With e the error, X what a build can be wrong by (delays of whole sensors, arms,
+turns, a range's bias) and Z = -d angle/dt de/d angle of some angles,
+    e = X b + Z L + w,
+Gauss-Newton with the column looked up anew each time.  It is those angles where the whole attitude
+leaves clearly more, over all of the log (leaving out one of sixteen stretches after the other), and
+a filter of the attitude, which delays quick angles less than slow ones, leaves more as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.diagnosis.candidates import candidates, plain_signatures
+from syncline_design.diagnosis.frozen_channels import euler_rates
+from syncline_design.diagnosis.gross import Gross, expected_size, usual_size
+from syncline_design.diagnosis.judged import log_f
+from syncline_design.diagnosis.looked_up import Weighed, vector_of
+from syncline_design.diagnosis.scene import Scene, scene
+from syncline_design.diagnosis.system import Measured
+from syncline_design.diagnosis.undone import BUILD
+from syncline_design.effects import plain_delay
+from syncline_design.effects.acting import Acting
+from syncline_design.effects.kinematics import euler_to_rotation, rotate
+from syncline_design.effects.record import Array
+from syncline_design.logs.log import GAP_FACTOR, Log
+from syncline_design.logs.stamps import per_stamp, usual_step_s
+from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.distributions import student_limit
+from syncline_design.model.normal import NORMAL_95
+from syncline_design.model.system import System
+
+FAR: Final = 1.5  # times the usual error of the spec's noise
+BLOCKS: Final = 16
+LEAST_ROWS: Final = 200
+ANGLES: Final = {(2,): "yaw", (0, 1): "roll and pitch", (0,): "roll", (1,): "pitch"}
+WHOLE: Final = (0, 1, 2)
+ALL_FREE: Final = ("position", "attitude", "ranging")
+CHANCE: Final = 1e-6  # that angles of one delay differ so much, over all groups
+CLEARLY_NATS: Final = 15.0  # by which some angles have to be likelier than all, in any 15 of 16
+LEAST_S, MOST_S = 2e-3, 2.0  # of a delay
+STEPS: Final = 8
+STEP_RAD: Final = 1e-5
+MEMORIES_S: Final = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
+Mask = NDArray[np.bool_]
+Group = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LateAngles:
+    """Angles that are late by themselves, and the log with them put back."""
+
+    fault: Gross
+    log: Log
+
+
+def is_far_off(inputs: Measured, few: Log) -> bool:
+    """Whether a log is clearly off its noise, before anything is looked for in it."""
+    view = scene(inputs.system, few, inputs.known)
+    return usual_size(view.error()) > FAR * expected_size(view)
+
+
+def late_angles(
+    inputs: Measured, log: Log, few: Log, exclude: Sequence[str] = ()
+) -> LateAngles | None:
+    """Angles of the attitude of a log of one vehicle that are late alone; few: the rows that are
+    worked on, of a long log some."""
+    looking = _Looking.of(inputs.system, few, inputs.known, exclude)
+    told = None if looking is None else looking.clearest()
+    if looking is None or told is None:
+        return None
+    group, delay_s, spread_s = told
+    delay = plain_delay()
+    acting = Acting(delay, "attitude", 0, {delay.parameters[0].name: delay_s})
+    back, known_rows = put_back(log, group, delay_s)
+    after = looking.left(group, delay_s)
+    falls_by = usual_size(looking.view.error()) / max(usual_size(after), 1e-300)
+    fault = Gross(acting, falls_by, spread_s, ANGLES[group])
+    return LateAngles(fault, back.rows(known_rows))
+
+
+def put_back(log: Log, group: Group, delay_s: float) -> tuple[Log, Mask]:
+    """The log with some angles as they were at its stamps, and the rows of which that is known."""
+    from scipy.interpolate import CubicSpline
+
+    first = log.stages[0]
+    times, angles = per_stamp(log.time_s, first.euler_rad)
+    wanted = log.time_s + delay_s
+    right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+    near = times[right] - times[right - 1] <= GAP_FACTOR * usual_step_s(log.time_s)
+    found = near & (wanted >= times[0]) & (wanted <= times[-1])
+    courses = CubicSpline(times, np.unwrap(angles, axis=0))(wanted)
+    euler = first.euler_rad.copy()
+    for k in group:
+        euler[found, k] = courses[found, k]
+    return replace(log, stages=(replace(first, euler_rad=euler), *log.stages[1:])), found
+
+
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    """Normal matrices, scores and squares of BLOCKS stretches of a log."""
+
+    normal: Array
+    score: Array
+    square: Array
+    rows: int
+
+    def without(self, freed: Sequence[int]) -> _Sums:
+        """The same with some columns free in every stretch by itself: noise that is slower than a
+        stretch is turned into these."""
+        own = list(freed)
+        normal, score, square = self.normal.copy(), self.score.copy(), self.square.copy()
+        for k in range(BLOCKS):
+            cross = self.normal[k][:, own]
+            inverse = np.linalg.inv(cross[own] + np.eye(len(own)))
+            normal[k] -= cross @ inverse @ cross.T
+            score[k] -= cross @ inverse @ self.score[k, own]
+            square[k] -= float(self.score[k, own] @ inverse @ self.score[k, own])
+        return _Sums(normal, score, square, self.rows)
+
+    def solved(self, keep: Sequence[int]) -> tuple[Array, Array]:
+        """Values of some columns, of all stretches and without each (1 + BLOCKS, k)."""
+        own = list(keep)
+        normal, score = self.normal[:, own][:, :, own], self.score[:, own]
+        whole, every = normal.sum(0), score.sum(0)
+        without = [np.zeros_like(whole), *normal]
+        less = [np.zeros_like(every), *score]
+        eye = np.eye(len(every))
+        values = np.array([np.linalg.solve(whole - a + eye, every - b)
+                           for a, b in zip(without, less, strict=True)])  # fmt: skip
+        return values, whole
+
+    def left(self, keep: Sequence[int]) -> Array:
+        """Squares that are left of every stretch, with the values of all of them (BLOCKS,)."""
+        values, _ = self.solved(keep)
+        b, own = values[0], list(keep)
+        normal, score = self.normal[:, own][:, :, own], self.score[:, own]
+        left: Array = self.square - 2.0 * score @ b + np.einsum("i,bij,j->b", b, normal, b)
+        return left
+
+
+@dataclass(frozen=True, slots=True)
+class _Looking:
+    """A log, what else it may be off by (n, 3, P) in units of a build, and what angles do.
+
+    swept (n, 3, 3): slopes of the error by roll, pitch and yaw times their rates.
+    whose: of each column of X the sensor that it delays; "" of one that is no delay.
+    turns: the columns of X that turn the attitude.
+    """
+
+    system: System
+    view: Scene
+    weighed: Weighed
+    columns: Array
+    swept: Array
+    whose: tuple[str, ...]
+    turns: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls, system: System, log: Log, known: Sequence[Acting], exclude: Sequence[str]
+    ) -> _Looking | None:
+        delay = plain_delay()
+        first = log.stages[0]
+        ranged = log.kind == "georeference" and first.antenna_m is not None
+        if len(system.stages) != 1 or not ranged or len(log) < LEAST_ROWS:
+            return None
+        if delay.name in exclude:
+            return None
+        view = scene(system, log, known)
+        asked = [s for s in plain_signatures(view, candidates(view, exclude)) if s.asked_jointly]
+        whose = tuple(
+            s.candidate.sensor if s.candidate.effect.delays else ""
+            for s in asked for _ in s.candidate.effect.slopes()
+        )  # fmt: skip
+        turned = [s.candidate.sensor == "attitude" and not s.candidate.effect.delays
+                  for s in asked for _ in s.candidate.effect.slopes()]  # fmt: skip
+        if "attitude" not in whose:
+            return None
+        columns = np.concatenate(
+            [s.columns * [BUILD[p.unit] for p in s.candidate.effect.slopes()] for s in asked],
+            axis=2,
+        )
+        return cls(system, view, Weighed.of(view), columns, _swept(view), whose,
+                   tuple(np.flatnonzero(turned)))  # fmt: skip
+
+    def left(self, group: Group, delay_s: float) -> Array:
+        """The error (n, 3) with some angles put back; as it was where that is not known."""
+        return self._put_back(group, delay_s)[0]
+
+    def _put_back(self, group: Group, delay_s: float) -> tuple[Array, Mask]:
+        log, found = put_back(self.view.log, group, delay_s)
+        return scene(self.system, log, self.view.known).error(), found
+
+    def clearest(self) -> tuple[Group, float, float] | None:
+        """The angles that are late alone, by how much, and its standard uncertainty."""
+        start = self._sums(self.view.error(), np.ones(len(self.view), bool))
+        if not any(self._differs(start, group) for group in ((2,), (0,), (1,))):
+            return None
+        fits = [(group, self._fitted(group)) for group in (*ANGLES, WHOLE)]
+        found = [(group, delay) for group, delay in fits if delay is not None]
+        if not found:
+            return None
+        best, delay_s = min(found, key=lambda one: self._square(*one))
+        if best == WHOLE or not LEAST_S <= abs(delay_s) <= MOST_S:
+            return None
+        if not self._is_clear(best, delay_s, [d for g, d in found if g == WHOLE]):
+            return None
+        return self._judged(best, delay_s)
+
+    def _differs(self, sums: _Sums, group: Group) -> bool:
+        """Whether angles are late by something else than the whole attitude is, by the
+        variance of leaving out one stretch after the other."""
+        value, spread = self._of_group(sums, group, ALL_FREE)
+        share = (value / max(spread, 1e-300)) ** 2
+        return log_f(share, 1, BLOCKS - 1) < math.log(CHANCE / len(ANGLES))
+
+    def _fitted(self, group: Group) -> float | None:
+        """The delay of some angles that leaves least, without one of the whole attitude."""
+        delay_s = 0.0
+        for _ in range(STEPS):
+            error, found = self._put_back(group, delay_s)
+            if np.mean(found) < 0.5:
+                return None
+            value, spread = self._of_group(self._sums(error, found), group)
+            delay_s += value
+            if not abs(delay_s) <= MOST_S:
+                return None
+            if abs(value) < 0.05 * spread:
+                break
+        return delay_s
+
+    def _judged(self, group: Group, delay_s: float) -> tuple[Group, float, float]:
+        error, found = self._put_back(group, delay_s)
+        value, spread = self._of_group(self._sums(error, found), group)
+        reach = student_limit(0.025, BLOCKS - 1) / NORMAL_95
+        return group, delay_s + value, reach * spread
+
+    def _kept(self, late: Sequence[str]) -> list[int]:
+        """Columns that are no delays, and the delays of some sensors."""
+        return [k for k, sensor in enumerate(self.whose) if not sensor or sensor in late]
+
+    def _of_group(self, sums: _Sums, group: Group, late: Sequence[str] = ()) -> tuple[float, float]:
+        """The delay [s] of some angles beside all else, and its standard uncertainty.
+
+        late: whole sensors that may be as well.
+        """
+        width, kept = self.columns.shape[2], self._kept(late)
+        together = np.zeros((width + 3, len(kept) + 1))
+        together[kept, range(len(kept))] = 1.0
+        together[[width + k for k in group], -1] = 1.0
+        own = _Sums(
+            together.T @ sums.normal @ together, sums.score @ together, sums.square, sums.rows
+        )
+        values, normal = own.solved(range(len(kept) + 1))
+        less = values[1:, -1]
+        spread2 = (BLOCKS - 1) / BLOCKS * float(np.sum((less - np.mean(less)) ** 2))
+        left = float(np.sum(own.left(range(len(kept) + 1))))
+        noise2 = left / max(sums.rows * float(np.mean(self.weighed.freedom)), 1.0)
+        at_best = noise2 * float(np.linalg.inv(normal + np.eye(len(normal)))[-1, -1])
+        unit = BUILD["s"]
+        return unit * float(values[0, -1]), unit * math.sqrt(max(spread2, at_best))
+
+    def _square(self, group: Group, delay_s: float) -> float:
+        return float(np.sum(self._blocks(group, delay_s)))
+
+    def _blocks(self, group: Group, delay_s: float) -> Array:
+        """What is left of every stretch, a row, with all else free (BLOCKS,)."""
+        error, found = self._put_back(group, delay_s)
+        return self._left_of(error, found)
+
+    def _left_of(self, error: Array, found: Mask) -> Array:
+        sums = self._sums(error, found)
+        left: Array = sums.left(self._kept(())) / max(sums.rows, 1)
+        return left
+
+    def _is_clear(self, group: Group, delay_s: float, of_whole: Sequence[float]) -> bool:
+        """Whether all angles together, and every filter of them, leave clearly more."""
+        own = self._blocks(group, delay_s)
+        rivals = [self._blocks(WHOLE, each) for each in of_whole]
+        every = np.ones(len(self.view), bool)
+        rivals += [self._left_of(error, every) for error in self._unfiltered()]
+        rows = len(self.view)
+        noise2 = float(np.sum(own)) / np.mean(self.weighed.freedom)  # as loud as what is left
+        gained = [0.5 * rows * (each - own) / noise2 for each in rivals]
+        return all(np.sum(nats) - np.max(nats) > CLEARLY_NATS for nats in gained)
+
+    def _unfiltered(self) -> Iterator[Array]:
+        """Errors of the log with what a low pass of its angles leaves behind put back."""
+        log = self.view.log
+        first = log.stages[0]
+        for memory_s in MEMORIES_S:
+            behind = _behind(log.time_s, euler_rates(first), memory_s)
+            own = replace(first, euler_rad=first.euler_rad + behind)
+            back = replace(log, stages=(own, *log.stages[1:]))
+            yield scene(self.system, back, self.view.known).error()
+
+    def _sums(self, error: Array, found: Mask) -> _Sums:
+        """Whitened, of X and the three angles beside one another."""
+        root = self.weighed.root * found[:, None, None]
+        every = np.concatenate([self.columns, BUILD["s"] * self.swept], axis=2)
+        columns = root @ np.nan_to_num(every)
+        left = np.einsum("nij,nj->ni", root, np.nan_to_num(error))
+        parts = np.array_split(np.arange(len(error)), BLOCKS)
+        normal = np.array([_inner(columns[p], columns[p]) for p in parts])
+        score = np.array([np.einsum("nik,ni->k", columns[p], left[p]) for p in parts])
+        square = np.array([float(np.sum(left[p] ** 2)) for p in parts])
+        whole = _Sums(normal, score, square, int(np.sum(found)))
+        return whole.without(self.turns)
+
+
+def _inner(first: Array, second: Array) -> Array:
+    product: Array = first.reshape(-1, first.shape[2]).T @ second.reshape(-1, second.shape[2])
+    return product
+
+
+def _swept(view: Scene) -> Array:
+    """What a second of delay of roll, pitch and yaw does to the error (n, 3, 3) [m/s]."""
+    logged = view.log.stages[0]
+    vector, plain = vector_of(view), euler_to_rotation(logged.euler_rad)
+    rates = euler_rates(logged)
+    columns = []
+    for k in range(3):
+        moved = euler_to_rotation(logged.euler_rad + STEP_RAD * np.eye(3)[k])
+        columns.append(-rates[:, [k]] * rotate(moved - plain, vector) / STEP_RAD)
+    return np.stack(columns, axis=2)
+
+
+def _behind(time_s: Array, rates: Array, memory_s: float) -> Array:
+    """By how much a first-order low pass of angles is behind them, from their rates (n, 3).
+
+    With y' = (x - y) / T the rest d = x - y follows d' = x' - d / T, from d = T x' on.
+    """
+    kept = np.exp(-np.diff(time_s) / memory_s)
+    behind = np.empty_like(rates)
+    behind[0] = memory_s * rates[0]
+    for k, keep in enumerate(kept):
+        behind[k + 1] = keep * behind[k] + (1.0 - keep) * memory_s * rates[k]
+    return behind
