@@ -14,7 +14,7 @@ import pytest
 
 from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.comparison.acceptance import Acceptance
-from syncline_design.diagnosis.late_runs import Late, late_runs
+from syncline_design.diagnosis.late_runs import Late, late_by_turns, late_runs
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.spec.load import load
@@ -220,3 +220,55 @@ def test_what_goes_on_to_the_end_of_a_log_is_left_to_the_search(
     view, found = looked_at(spec, write_columns(tmp_path / "log.csv", columns))
     assert np.median(np.linalg.norm(np.nan_to_num(view.error())[at], axis=1)) > 0.5
     assert found == []
+
+
+def by_turns(period: int, first: int) -> Mask:
+    return lambda time_s: np.arange(len(time_s)) % period == first
+
+
+@pytest.mark.parametrize("device", ["position", "attitude", "ranging"])
+@pytest.mark.parametrize(("period", "delay_s"), [(2, 0.05), (3, 0.08)])
+def test_rows_that_are_late_by_turns_are_told_by_their_device(
+    device: str, period: int, delay_s: float, tmp_path: Path
+) -> None:
+    view, _ = looked_at(*mixed(tmp_path, device, delay_s, by_turns(period, 1)))
+    (one,) = late_by_turns(view, np.zeros(len(view), bool))
+    assert one.sensor == device
+    assert np.array_equal(one.rows, np.arange(len(view))[1::period])
+    assert abs(one.delay_s - delay_s) < 3.0 * one.spread_s < 0.02
+
+
+def test_every_second_place_that_is_late_breaks_its_latency_alone(tmp_path: Path) -> None:
+    """In half of the log: 10 ms late in all of it, and three times as noisy, it was."""
+    told = accepted(*mixed(tmp_path, "position", 0.05, by_turns(2, 1)))
+    rows = {(row.role, row.assumption): row for row in told.assumptions}
+    assert [key for key, row in rows.items() if row.status == "broken"] == [("position", "latency")]
+    figure = rows["position", "latency"].measured
+    assert figure is not None
+    assert figure.low is not None
+    assert figure.high is not None
+    assert figure.low < 0.05 < figure.high < figure.low + 0.02
+    assert "single rows" in rows["position", "latency"].evidence
+
+
+def test_rows_of_one_delay_take_no_turns(tmp_path: Path) -> None:
+    """A sound log, one that is late as a whole, for a while, and here and there."""
+    for at, delay_s in (
+        (during(0.0, 0.0), 0.1), (during(-1.0, 1e9), 0.1), (during(30.0, 40.0), 0.1),
+        (here_and_there(0.2, 6), 0.2),
+    ):  # fmt: skip
+        view, _ = looked_at(*mixed(tmp_path, "position", delay_s, at))
+        assert late_by_turns(view, np.zeros(len(view), bool)) == ()
+
+
+def test_every_second_reading_that_scatters_takes_no_turns(tmp_path: Path) -> None:
+    sound = make_log(world(*RUN))
+    rng = np.random.default_rng(5)
+    columns = dict(sound.columns)
+    at = np.arange(len(columns["time_s"])) % 2
+    for name in OF["position"]:
+        columns[name] = columns[name] + at * rng.normal(0.0, 0.3, len(at))
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(sound.spec_yaml(), "utf-8")
+    view, _ = looked_at(spec, write_columns(tmp_path / "log.csv", columns))
+    assert late_by_turns(view, np.zeros(len(view), bool)) == ()

@@ -23,7 +23,7 @@ from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.frozen_channels import frozen_channels
 from syncline_design.diagnosis.instead import InItsPlace, in_place
-from syncline_design.diagnosis.late_runs import late_runs
+from syncline_design.diagnosis.late_runs import Late, late_by_turns, late_runs
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
 from syncline_design.diagnosis.looked_up import Mask
 from syncline_design.diagnosis.motion_columns import with_slopes
@@ -95,9 +95,10 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
     in_force().doing("reading the log")
     with one_thread():
         inputs = measured(case, paths)
-        one = examined(inputs, settings)
+        turns, rest = _without_turns(inputs)
+        one = examined(rest, settings)
         first = one
-        held, taken = _held(inputs, one), list[Stands]()
+        held, taken = _held(rest, one), list(_as_stands(inputs, one.data, turns))
         seen = Stretches(held) if held else _seen(one)
         for _ in range(ROUNDS + bool(held)):
             sure = [s for s in seen.stands if s.sure]
@@ -126,6 +127,19 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
         )
 
 
+def _without_turns(inputs: Measured) -> tuple[list[tuple[Late, ...]], Measured]:
+    """Rows that are late by turns with the others, and the log without them: half of a log's rows
+    pass for noise and for waves of all sorts, which a search would take long to lay on each other.
+    """
+    view = scene(inputs.system, inputs.log, inputs.known)
+    found = late_by_turns(view, np.zeros(len(view), bool))
+    if not found:
+        return [], inputs
+    rows = np.isin(np.arange(len(view)), found[0].rows)
+    left = inputs.log.rows(np.flatnonzero(~rows))
+    return [found], replace(inputs, log=_derived_anew(left), reread=None)
+
+
 def _moving(
     inputs: Measured, first: SearchedLog, last: SearchedLog, taken: Sequence[Stands]
 ) -> Scene:
@@ -143,6 +157,7 @@ def _moving(
         over_s = max(MEAN_S.values())
         wide = [replace(one, margin_s=one.margin_s + over_s) for one in taken]
         log = log.rows(~_rows_of(log.time_s, wide))
+        log = _derived_anew(log) if any(one.stamps_s for one in taken) else log
     return scene(inputs.system, log, inputs.known)
 
 
@@ -156,15 +171,15 @@ def _held(inputs: Measured, one: SearchedLog) -> tuple[Stands, ...]:
     held = np.zeros(len(view), bool)
     for each in repeated:
         held |= (view.log.time_s >= each.from_s) & (view.log.time_s <= each.to_s)
-    return (*repeated, *_late(inputs, view, one.data, held))
+    return (*repeated, *_as_stands(inputs, one.data, late_runs(view, held)))
 
 
-def _late(inputs: Measured, view: Scene, data: Data, held: Mask) -> Iterator[Stands]:
+def _as_stands(inputs: Measured, data: Data, late: Sequence[tuple[Late, ...]]) -> Iterator[Stands]:
     """Delays for a while that readings of other rows show, with what is the same delay."""
     time_s, delay = inputs.log.time_s, plain_delay()
     usual_m = max(expected_rms_m(data), 1e-300)
     stage, names = inputs.system.stages[0].name, (delay.parameters[0].name,)
-    for first, *others in late_runs(view, held):
+    for first, *others in late:
         fits = tuple(
             OtherFit((delay.name, each.sensor, 0), stage, names, (each.delay_s,), (each.spread_s,))
             for each in others

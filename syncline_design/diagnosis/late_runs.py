@@ -19,6 +19,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.diagnosis.in_turn import in_turn, than_the_others
 from syncline_design.diagnosis.looked_up import (
     LEAST_ROWS,
     Index,
@@ -29,6 +30,8 @@ from syncline_design.diagnosis.looked_up import (
 )
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.stretches import is_inside
+from syncline_design.effects import plain_delay
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import ActsOn, Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import chi_square_limit
@@ -41,6 +44,7 @@ MOST_OF_LOG: Final = 0.6  # in runs: beyond that it is no while
 MOST_SINGLE: Final = 0.3  # of a log
 LEAST_S, MOST_S = 0.1, 10.0  # of a delay: a shorter one is carried on by its motion
 LEAST_SINGLE_S: Final = 0.02  # of single rows, which no motion carries on
+LEAST_BY_TURNS_S: Final = 2e-3  # of as many as take turns
 GRID_S: Final = 0.05
 FINER, TIMES = 10, 2  # delays to either side of the best, and how often
 ONE: Final = (1.0,)  # a delay of one value
@@ -49,6 +53,7 @@ MOST_GROWN_S: Final = 2.0
 NEAR_S: Final = 1e-3  # to either side, over which errors are straight lines in a delay
 POLISHED: Final = 4  # steps
 CHANCE: Final = 1e-4  # that noise is louder than what is taken for noise
+AS_GOOD_NATS: Final = 4.5  # within which another device fits as well
 BETTER_NATS: Final = 5.0  # by which a single row has to be late rather than sound
 WIDENED: Final = 3  # times that rows are added to those that are late
 _Told = tuple[Array, Array]  # delays and their spreads
@@ -92,6 +97,53 @@ def late_runs(view: Scene, held: Mask) -> list[tuple[Late, ...]]:
             told.append(run)
             found.append(fits)
     return [*found, *_single(weighed, far, held, (_any_of(told, far), in_runs))]
+
+
+def late_by_turns(view: Scene, held: Mask) -> tuple[Late, ...]:
+    """Devices of which every second, third, ... row is late, where what is left is noise."""
+    if len(view.system.stages) != 1 or view.log.stages[0].antenna_m is None:
+        return ()
+    rows = in_turn(view, Weighed.of(view).root, held)
+    if rows is None:
+        return ()
+    sound = Weighed.of(view, ~rows & ~held)
+    every = _fits(LateRows(sound, rows & ~held, held, single=True, by_turns=True))
+    fits = [_than_the_others(sound, held, one) for one in every]
+    fits = [one for one in fits if abs(one.delay_s) >= LEAST_BY_TURNS_S]
+    return tuple(_as_good(sound, fits))
+
+
+def _than_the_others(weighed: Weighed, held: Mask, one: Late) -> Late:
+    """Ranges and bearings are held against targets, and not against those before and after: as
+    late as they are beside these."""
+    if one.sensor != "ranging":
+        return one
+    rows = np.isin(np.arange(len(held)), one.rows)
+    more_s, spread_s = than_the_others(weighed.view, weighed.root, held, rows, _acting(one))
+    return replace(one, delay_s=one.delay_s + more_s, spread_s=spread_s)
+
+
+def _as_good(weighed: Weighed, fits: Sequence[Late]) -> Sequence[Late]:
+    """The devices that leave least of their rows."""
+    if len(fits) < 2:
+        return fits
+    left = [_left_of_rows(weighed, one) for one in fits]
+    own2 = min(left) / max(float(np.sum(weighed.freedom[fits[0].rows])), 1.0)
+    return [
+        one for one, square in zip(fits, left, strict=True)
+        if 0.5 * (square - min(left)) / own2 < AS_GOOD_NATS
+    ]  # fmt: skip
+
+
+def _left_of_rows(weighed: Weighed, one: Late) -> float:
+    """Squares of the rows that are late with their delay undone by their motion."""
+    error = np.nan_to_num(weighed.view.error((_acting(one),))[one.rows])
+    return float(np.sum(np.einsum("nij,nj->ni", weighed.root[one.rows], error) ** 2))
+
+
+def _acting(one: Late) -> Acting:
+    delay = plain_delay()
+    return Acting(delay, one.sensor, 0, {delay.parameters[0].name: one.delay_s})
 
 
 def _single(
@@ -150,7 +202,7 @@ def _late(asked: LateRows, sensor: ActsOn) -> Late | None:
     for shape in (ONE,) if asked.single else (ONE, *GROWING):
         start = _on_a_grid(looked, np.array(shape), most_s if shape == ONE else MOST_GROWN_S)
         told = None if start is None else _at_least(looked, start)
-        if told is not None and asked.single:
+        if told is not None and asked.single and not asked.by_turns:
             looked, told = _with_all_single(looked, told)
         elif told is not None and shape != ONE:
             looked, told = _from_nothing_on(looked, told)
@@ -160,6 +212,8 @@ def _late(asked: LateRows, sensor: ActsOn) -> Late | None:
 
 
 def _least_s(asked: LateRows) -> float:
+    if asked.by_turns:
+        return LEAST_BY_TURNS_S
     return LEAST_SINGLE_S if asked.single else LEAST_S
 
 

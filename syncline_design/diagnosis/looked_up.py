@@ -40,7 +40,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """A log of one vehicle with the noise of its rows, as loud as the median row shows it.
+    """A log of one vehicle with the noise of its rows, as loud as the median row of some shows it.
 
     root (n, 3, 3) of the inverse of every row's covariance, zero where nothing is compared; square
     (n,) of every row over its noise, of `freedom` components; beside (n, 3): what the spec's own
@@ -54,7 +54,8 @@ class Weighed:
     beside: Array
 
     @classmethod
-    def of(cls, view: Scene) -> Weighed:
+    def of(cls, view: Scene, among: Mask | None = None) -> Weighed:
+        """among: the rows that say how loud it is; None: all."""
         error = np.nan_to_num(view.error())
         structure = structure_of(view)
         known = np.isfinite(view.log.truth_m)
@@ -65,7 +66,8 @@ class Weighed:
         root = np.linalg.inv(np.linalg.cholesky(covariance)) * known[:, :, None]
         freedom = np.maximum(np.sum(known, axis=1), 1)
         square = np.sum(np.einsum("nij,nj->ni", root, error) ** 2, axis=1)
-        louder = max(float(np.median(square / chi_square_limit(0.5, freedom))), 1.0)
+        over = square / chi_square_limit(0.5, freedom)
+        louder = max(float(np.median(over if among is None else over[among])), 1.0)
         antenna_m = view.log.stages[0].antenna_m
         assert antenna_m is not None
         swung = rotate(euler_to_rotation(view.log.stages[0].euler_rad), vector_of(view))
@@ -93,13 +95,14 @@ def vector_of(view: Scene) -> Array:
 class LateRows:
     """Rows of which one device is late: of a while, or single ones among sound rows.
 
-    elsewhere: rows that are no witness.
+    elsewhere: rows that are no witness.  by_turns: whether single rows are all of a pattern.
     """
 
     of: Weighed
     inside: Mask
     elsewhere: Mask
     single: bool = False
+    by_turns: bool = False
 
     @property
     def ends_s(self) -> tuple[float, float]:
