@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -31,6 +32,7 @@ from syncline_design.diagnosis.result import (
     BlindSpot,
     Check,
     Diagnosis,
+    Estimate,
     Informative,
     Rival,
 )
@@ -285,6 +287,31 @@ def test_a_wave_that_is_no_effect_leaves_the_rows_open(found: Diagnosis) -> None
     wave = replace(found.findings[0], effect="spectral_line", kind="stand_in", aliases=())
     rows = dict(judged(load(EXAMPLE), replace(found, findings=(wave,))))
     assert {one.status for key, one in rows.items() if key[0] != "platform"} == {"not_shown"}
+
+
+def test_noise_that_a_constant_breaks_has_the_figure_of_both(found: Diagnosis) -> None:
+    """Scatter as specified beside ranges 15 cm too long, where the spec's noise makes 4 cm.
+
+    The row showed 1 time its figure and was broken.
+    """
+    bias = Estimate(0.15, 0.01, "m", True, "15 cm", (0.13, 0.17))
+    long = replace(found.findings[0], effect="range_bias", sensor="ranging", aliases=(),
+                   parameters={"bias_m": bias}, size_m=0.15, kind="cause")  # fmt: skip
+    longer = replace(found, findings=(long,))
+    case = load(EXAMPLE)
+    sound = {key: replace(own, sigma=(0.02, 1e-3, 1e-3)) for key, own in AS_SPECIFIED.items()}
+    sight = Sighted(longer, factors=sound, stated_m={"multirotor/ranging": 0.04})
+    log = LogEvidence(longer, OnPaper(case, ()), "multirotor", sight=sight)
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    one = next(a for a in assumptions(case, verdict) if (a.role, a.name) == ("ranging", "noise"))
+    row = by_log(one, log)
+    assert row.status == "broken"
+    assert row.measured is not None
+    ends = [
+        math.hypot(part, size / 0.04) for part, size in ((1.0, 0.15), (0.99, 0.13), (1.01, 0.17))
+    ]
+    assert (row.measured.value, row.measured.low, row.measured.high) == pytest.approx(ends)
+    assert "with all of that" in row.words
 
 
 def test_a_wave_of_one_sensor_is_no_noise_that_another_may_have(found: Diagnosis) -> None:

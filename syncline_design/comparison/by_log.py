@@ -16,7 +16,7 @@ from syncline_design.comparison.by_noise import (
     noise_figure,
     noise_open,
     noise_within,
-    readings,
+    of_what,
     swaying_words,
     sways,
 )
@@ -66,7 +66,11 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     breaking = [f for f in breaking if log.is_sure(one, f) and not is_shape(one, f, log)]
     if breaking or (standing is not None and standing.status == "broken"):
         said = _broken(
-            one, breaking, standing, broken_figure(one, log, breaking), readings(log.split(one))
+            one,
+            breaking,
+            standing,
+            broken_figure(one, log, breaking),
+            of_what(breaking, log.split(one)),
         )
         undone = list(log.parts.undone(one, _width(said.measured)))
         if one.name == "noise":  # how far it scatters is not what constants and drifts hide
@@ -191,7 +195,7 @@ def _broken(
 ) -> Judgement:  # fmt: skip
     """By the largest departure; all of them are said, with what the log cannot tell them from.
 
-    where: in which readings the noise is so large.
+    where: of what the noise is so large.
     """
     also = standing if standing is not None and standing.status == "broken" else None
     if not breaking:
@@ -202,8 +206,7 @@ def _broken(
     figure = figure_of(one, first.parameters)
     if one.name == "noise" and noise is not None:
         figure = noise
-        words += (f"; {to_digits(noise.value or 0.0, 3)} times{where}, where the interval counts "
-                  "what is as likely another sensor's")  # fmt: skip
+        words += f"; {to_digits(noise.value or 0.0, 3)} times{where}"
     return Judgement("broken", words, figure, first.from_s, first.to_s)
 
 

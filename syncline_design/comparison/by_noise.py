@@ -26,6 +26,7 @@ from syncline_design.model.normal import NORMAL_95
 
 _SCATTER: Final = ("factor", "slow", "down", "episode", "tails")  # what noise can be besides white
 Span = tuple[float, float]
+Span3 = tuple[float, float, float]
 
 
 def noise_open(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) -> Judgement | None:
@@ -197,6 +198,9 @@ def broken_figure(
     """The figure of a noise row that is broken: of the split, or of the finding where that leaves
     it open whether it is beyond the spec's; with what is a departure of all readings in squares."""
     figure = noise_figure(one, log)
+    lasting = [f for f in breaking if not is_scatter(f)]
+    if lasting:
+        return _with_lasting(one, log, figure, lasting)
     if figure is None or figure.low is None or figure.high is None:
         return figure
     if figure.low <= 1.0:
@@ -206,6 +210,37 @@ def broken_figure(
             value = max(figure.value or 0.0, low)
             return MeasuredFigure(value, low, max(figure.high, value))
     return figure
+
+
+def _with_lasting(
+    one: Assumed, log: LogEvidence, figure: MeasuredFigure | None, lasting: Sequence[Finding]
+) -> MeasuredFigure | None:
+    """What scatters with what constants, drifts and scales of the readings make on this log beside
+    it, as RMS over what the spec's noise of the sensor makes: sqrt(f^2 + sum (m / m_spec)^2)."""
+    known = {} if log.sight is None else log.sight.stated_m
+    stated = known.get(f"{one.stage}/{one.role}", 0.0)
+    if not stated > 0.0 or any(f.size_m is None for f in lasting):
+        return None
+    own = log.split(one)
+    scatter = (1.0,) * 3 if own is None else own.whole
+    if own is None and figure is not None:
+        scatter = (figure.value or 1.0,) * 3
+    sizes = [tuple(share * (f.size_m or 0.0) / stated for share in _shares(f)) for f in lasting]
+    value, low, high = (
+        math.hypot(part, *(size[k] for size in sizes)) for k, part in enumerate(scatter)
+    )
+    return MeasuredFigure(value, low, high)
+
+
+def _shares(finding: Finding) -> Span3:
+    """1, and a finding's interval over its value: of several parameters, of their length."""
+    spans = [(float(p.value), *_span(p)) for p in finding.parameters.values()
+             if p.seen and p.standard_uncertainty is not None]  # fmt: skip
+    size = math.hypot(*(value for value, *_ in spans))
+    if not size > 0.0:
+        return 1.0, 0.0, math.inf
+    reach = math.hypot(*(0.5 * (high - low) for _, low, high in spans)) / size
+    return 1.0, max(1.0 - reach, 0.0), 1.0 + reach
 
 
 def noise_figure(one: Assumed, log: LogEvidence) -> MeasuredFigure | None:
@@ -250,6 +285,13 @@ def readings(own: NoiseFactors | None) -> str:
         return ""
     others = (f"{to_digits(f.value, 3)} in {' and '.join(f.readings)}" for f in own.parts[1:])
     return f" in {' and '.join(own.loudest.readings)} ({', '.join(others)})"
+
+
+def of_what(breaking: Sequence[Finding], own: NoiseFactors | None) -> str:
+    """What the figure of a broken row is of: all that is off, or what scatters most."""
+    if any(not is_scatter(f) for f in breaking):
+        return " the spec's noise on this log, with all of that"
+    return f"{readings(own)}, where the interval counts what is as likely another sensor's"
 
 
 def _said(finding: Finding) -> str:

@@ -27,7 +27,7 @@ from syncline_design.diagnosis.late_runs import Late, late_by_turns, late_runs
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
 from syncline_design.diagnosis.looked_up import Mask
 from syncline_design.diagnosis.motion_columns import with_slopes
-from syncline_design.diagnosis.noise_split import NoiseFactors, factors
+from syncline_design.diagnosis.noise_split import NoiseFactors, factors, stated_m
 from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import SearchedLog, examined, told
@@ -70,6 +70,7 @@ class Sighted:
     beyond: how far speed and turn rate are beyond their limits, by code and stage.
     ends_s: stamps of the log's first and last row; None: not known.  course: what is left, where
     that is one course that begins and ends.  left_out: share of the rows that it is without.
+    stated_m: RMS that the spec's noise of every sensor makes, by `stage/sensor`.
     """
 
     found: Diagnosis
@@ -83,6 +84,7 @@ class Sighted:
     course: OneCourse | None = None
     left_out: float = 0.0
     sways: Mapping[str, float] = field(default_factory=dict)
+    stated_m: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def left_in(self) -> tuple[Stands, ...]:
@@ -124,6 +126,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             left_as_one(one.data, model, one.search.signatures),
             1.0 - len(one.inputs.log) / len(inputs.log),
             swaying(one.data, model, one.search.signatures, one.search.unlike or ()),
+            stated_m(one.data),
         )
 
 

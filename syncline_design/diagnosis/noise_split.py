@@ -63,6 +63,17 @@ class NoiseFactors:
         return self.parts[0]
 
     @property
+    def whole(self) -> tuple[float, float, float]:
+        """The factor of all readings by their share, with the ends of its interval."""
+        parts = list(zip(self.share, self.parts, strict=True))
+        ends = [[f.value, f.low, f.high] for _, f in parts]
+        value, low, high = (
+            math.sqrt(sum(s * end[k] ** 2 for (s, _), end in zip(parts, ends, strict=True)))
+            for k in range(3)
+        )
+        return value, low, high
+
+    @property
     def most(self) -> float:
         """The factor on all of the sensor that is as bad as what the log leaves open at most."""
         known = [s * f.value**2 for s, f in zip(self.share, self.parts, strict=True)]
@@ -95,6 +106,17 @@ def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[
         factor = NoiseFactor(_root(v), _root(v - r), _root(v + r), names if len(names) < 3 else ())
         found.setdefault(one.sensor, []).append((factor, _share(data, one)))
     return {"/".join(key): _loudest_first(own, _sigma(data, key)) for key, own in found.items()}
+
+
+def stated_m(data: Data) -> Mapping[str, float]:
+    """RMS [m] that every sensor's white noise makes on a log by the spec, by `stage/sensor`."""
+    compared = np.isfinite(data.view.log.truth_m)
+    return {
+        "/".join(white.sensor): math.sqrt(
+            float(np.mean(np.sum(np.einsum("nii->ni", white.covariance) * compared, axis=1)))
+        )
+        for white in data.structure.white
+    }
 
 
 def components(data: Data, unlike: Sequence[Unlike]) -> tuple[tuple[SensorKey, ...], Array, Array]:
