@@ -454,8 +454,15 @@ def test_a_table_of_stamps_is_not_assigned_but_named(clocked: Path) -> None:
 
 def test_a_clock_log_of_several_vehicles_needs_an_owner(tmp_path: Path) -> None:
     (log,) = sessions_csv(tmp_path, [1e-4], count=800, step_s=10.0)
+    spec = ROOT / "specs" / "rov_relay.yaml"
     with pytest.raises(BadInput, match="several vehicles"):
-        accept(load(ROOT / "specs" / "rov_relay.yaml"), [log], AcceptSettings(("clock",)), seed=0)
+        accept(load(spec), [log], AcceptSettings(("clock",)), seed=0)
+    done = run("accept", spec, log)
+    assert done.exit_code == 2
+    assert f"say whose it is: --assign vessel={log}" in done.stderr.replace("\n", "")
+    wrong = run("accept", spec, "--assign", f"vesel={log}")
+    assert wrong.exit_code == 2
+    assert f"--assign vessel={log}" in wrong.stderr.replace("\n", "")
 
 
 def test_a_spec_that_fails_on_paper_is_not_accepted(clocked: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.acceptance_samples import ROOT, run
+from tests.acceptance_samples import EXAMPLE, ROOT, first_rows, run
 from tests.clock_logs import START, sessions_csv, tracking_line, write
 from tests.test_acceptance_clocks import CLOCKED, OWN_CLOCK
 
@@ -122,3 +122,12 @@ def test_a_log_that_is_assigned_and_given_besides_is_refused_so(tmp_path: Path) 
     done = run("accept", spec, log, "--assign", f"auv={log}", "--only", "clock")
     assert (done.exit_code, done.stdout) == (2, "")
     assert "given with --assign auv and without; expected each log once" in done.stderr
+
+
+def test_places_that_are_given_twice_are_refused(tmp_path: Path) -> None:
+    """By the same path it was taken once, without a word; by a copy it was refused."""
+    log = first_rows(tmp_path)
+    for again in (log, tmp_path / "." / log.name):
+        done = run("accept", EXAMPLE, log, again)
+        assert (done.exit_code, done.stdout) == (2, "")
+        assert "the same log is given twice" in done.stderr

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from syncline_design.auditing.run import files_of
 from syncline_design.clocks.reading import is_clock_log, read_logs
 from syncline_design.comparison.acceptance import EvidenceFile, ReadAs
 from syncline_design.logs import delimited
+from syncline_design.logs.given_once import demand_once
 from syncline_design.logs.readers import reader_of
 from syncline_design.logs.readers.csv_names import RECEIVE, time_columns
 from syncline_design.logs.readers.reader import head_of
@@ -50,7 +52,9 @@ def evidence_files(
     if plain:
         owner = _only_vehicle(case, plain[0])
         clocks[owner] = (*clocks.get(owner, ()), *plain)
-    kinds = {path: _kinds(path) for path in logs if path not in plain}
+    others = [path for path in logs if path not in plain]
+    demand_once(others)
+    kinds = {path: _kinds(path) for path in others}
     return EvidenceFiles(
         clocks,
         tuple(path for path, found in kinds.items() if "stamps" in found),
@@ -78,8 +82,10 @@ def _demand_places(case: Case, assigned: Mapping[str, Sequence[Path]]) -> None:
     wrong = next((name for name in assigned if name not in known), None)
     if wrong is not None:
         expected = "a vehicle or STAGE/ROLE: " + ", ".join(known)
+        near = get_close_matches(wrong, known, 1)
+        hint = f"--assign {near[0]}={assigned[wrong][0]}" if near else ""
         raise BadInput((Flaw(str(case.path), 0, 0, "", f"--assign {wrong}: not in the spec",
-                             expected, repr(wrong), ""),))  # fmt: skip
+                             expected, repr(wrong), hint),))  # fmt: skip
 
 
 def _demand_clocks(name: str, paths: Sequence[Path]) -> None:
@@ -110,7 +116,8 @@ def _only_vehicle(case: Case, log: Path) -> str:
     known = clocked or _vehicles(case)
     if len(known) > 1:
         raise BadInput((Flaw(str(log), 0, 0, "", "a clock log, and the spec has several vehicles",
-                             "--assign VEHICLE=LOG for each", ", ".join(known), ""),))  # fmt: skip
+                             "--assign VEHICLE=LOG for each", ", ".join(known),
+                             f"say whose it is: --assign {known[0]}={log}"),))  # fmt: skip
     return known[0]
 
 
