@@ -52,7 +52,8 @@ MATTERS = 1e-3  # of a row's white standard deviation: channels below have no sa
 FLAT = 1e6  # prior variance of a constant while the sizes are found
 SCALE_LEAST = 0.02
 RIDGE = 1e-9  # of scaled columns that hold one another
-SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
+SIZES = 9  # variances of a channel that are weighed
+SWEEPS = 3
 # Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
 KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
 KIN_SPREAD = 1.0  # standard deviation in log variance by which they differ
@@ -170,27 +171,37 @@ class States:
         prior = self._weighted(level, error, np.zeros((*error.shape, 0))).prior
         return {self.roles[c]: float(1.0 / prior[self.channel == c][1]) for c in set(self.channel)}
 
-    def shown_prior(self, total: Array, width: int, level: NoiseLevel) -> Array:
-        """Prior precision of `width` free columns and of the courses of the channels that show any.
+    def expected_prior(self, total: Array, width: int, level: NoiseLevel) -> Array:
+        """Prior precision of `width` free columns and of the courses, each channel's variance what
+        is expected of it.
 
-        total: normal matrix of these columns, of others, and of the error as the last.  A channel
-        whose courses do not raise the evidence by SHOWN_NATS counts as having none.
+        total: normal matrix of these columns, of others, and of the error as the last.
         """
         fixed = width + self.courses.shape[2]
         normal, score = total[:fixed, :fixed], total[:fixed, -1]
         start, limit = np.full(len(self.roles), 0.1), self._limits(level)
         size2 = self._sized(normal, score, width, start, limit)
-        evidence = self._evidence(normal, score, width, size2)
-        while np.any(size2 > LEAST**2):
-            less = []
-            for c in np.flatnonzero(size2 > LEAST**2):
-                without = np.where(np.arange(size2.size) == c, LEAST**2, size2)
-                less.append((self._evidence(normal, score, width, without), without))
-            best = max(less, key=lambda one: one[0])
-            if best[0] < evidence - SHOWN_NATS:
-                break
-            evidence, size2 = best
+        size2 = self._expected(normal, score, width, size2, limit)
         return np.concatenate([np.zeros(width), np.maximum(self.wave, 1) / size2[self.channel]])
+
+    def _expected(
+        self, normal: Array, score: Array, width: int, size2: Array, limit: Array
+    ) -> Array:
+        """Mean of each channel's variance by what the log says of it, the others as they are.
+
+        The likeliest is near 0 where a log is too short to show slow noise, and the variance of
+        what a bias is known to grows with this variance: so its mean counts, over all from LEAST^2
+        to the limit, alike likely by their logarithm.
+        """
+        found = size2.copy()
+        for c in np.tile(np.arange(len(found)), SWEEPS):
+            sizes = np.geomspace(LEAST**2, limit[c], SIZES)
+            tried = np.tile(found, (SIZES, 1))
+            tried[:, c] = sizes
+            logs = np.array([self._evidence(normal, score, width, one) for one in tried])
+            likely = np.exp(logs - np.max(logs))
+            found[c] = float(sizes @ likely / np.sum(likely))
+        return found
 
     def _evidence(self, normal: Array, score: Array, width: int, size2: Array) -> float:
         """log of the restricted likelihood of courses of these sizes [nat], but for a constant."""

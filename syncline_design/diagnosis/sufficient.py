@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.candidates import Candidate, candidates, signature, slopes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import SLOW_LEAST, NoiseLevel, Structure, precision
-from syncline_design.diagnosis.slow_states import SHOWN_NATS, States
+from syncline_design.diagnosis.slow_states import States
 from syncline_design.diagnosis.slow_sums import LEAST_BLOCKS, LOST
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.record import Array
@@ -31,6 +31,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 FAR = 1.6  # root mean square of a row's whitened components, from where on a row counts less
 REWEIGHTED = 1
 LEAST_WEIGHT = 1e-3
+SHOWN_NATS = 2.5  # of likelihood, from which a sensor has Gauss-Markov noise beside its courses
 PLAUSIBLE = 2.0  # standard deviation, in bounds of a log, of an effect that its search did not name
 Seen = NDArray[np.bool_]
 TermLabel = tuple[str, str, int, str]  # effect, sensor, stage, parameter
@@ -96,8 +97,8 @@ def _left(data: Data, model: Model, nuisance: Array, columns: Array) -> Array:
 def shown_level(data: Data, model: Model, left: Array) -> NoiseLevel:
     """The fitted noise without the slow parts that do not raise the likelihood by SHOWN_NATS.
 
-    left (n, 3): what is judged by it.  A fit finds some slow noise in every log; what is not shown
-    would only widen every interval.
+    left (n, 3): what is judged by it.  A fit finds some slow noise in every log; how much there may
+    be that a log does not show, the courses say.
     """
     level = model.level
     nll = _nll(data, left, level)
@@ -184,7 +185,7 @@ def _prior(states: States, total: Array, width: int, level: NoiseLevel) -> Array
     beside = total[np.ix_(order, order)]
     effects = np.arange(width, free)
     beside[effects, effects] *= 1.0 + PLAUSIBLE**-2.0
-    found = states.shown_prior(beside, free, level)
+    found = states.expected_prior(beside, free, level)
     return np.concatenate([np.zeros(width), found[free:]])
 
 
