@@ -32,14 +32,14 @@ FIRST = 1.79e9
 
 
 def statistics(
-    rng: np.random.Generator, values: np.ndarray, alike: float = 0.0, still: bool = False
+    rng: np.random.Generator, values: np.ndarray, alike: float = 0.0, still: float = 0.0
 ) -> Sufficient:
-    """Of a linear log with unit noise; alike: cosine of latency and the datum's north; still: a
-    vehicle at rest, which shows no latency."""
+    """Of a linear log with unit noise; alike: cosine of latency and the datum's north; still: by
+    how much less it shows the latency, 1 for a vehicle at rest."""
     columns = rng.standard_normal((ROWS, len(LABELS)))
     columns[:, 2] = alike * columns[:, 0] + np.sqrt(1.0 - alike**2) * columns[:, 2]
     columns /= UNITS
-    columns[:, 0] *= not still
+    columns[:, 0] *= 1.0 - still
     whole = np.column_stack([columns, columns @ values + rng.standard_normal(ROWS)])
     total = whole.T @ whole
     less = np.array([total - part.T @ part for part in np.split(whole, BLOCKS)])
