@@ -1,6 +1,6 @@
 """How much many logs tell together, and how often a watch rings for nothing.
 
-    python -m benchmarks.campaign logs [--count N] [--foreign] [--kind position]
+    python -m benchmarks.campaign logs [--count N] [--foreign] [--kind position] [--seconds S]
     python -m benchmarks.campaign power [--sets N] [--foreign]
     python -m benchmarks.campaign series [--series N] [--looks N] [--scatter S] [--drift D]
         [--constants N] [--off S] [--days FOLDER] [--store FILE]
@@ -64,9 +64,9 @@ SECONDS, HZ = 120.0, 5.0
 SHIPPED = ("white", "wandering")
 
 
-def made(platform: str, seed: int, kind: str, noise: str) -> Sufficient:
+def made(platform: str, seed: int, kind: str, noise: str, seconds: float = SECONDS) -> Sufficient:
     """Statistics of one clean log, read from its file, its noise fitted, nothing looked for."""
-    run = scenario(platform, seed, SECONDS, HZ, kind)
+    run = scenario(platform, seed, seconds, HZ, kind)
     wander = Noise(wander_share=0.6, wander_time_s=15.0)
     if noise in SHIPPED:
         log = make_log(run, (), Noise() if noise == "white" else wander)
@@ -85,7 +85,7 @@ def kept(kind: str, *, is_foreign: bool) -> Path:
     return OUT / f"campaign_{kind}_{'foreign' if is_foreign else 'model'}.pickle"
 
 
-def make_logs(count: int, kind: str, *, is_foreign: bool) -> None:
+def make_logs(count: int, kind: str, seconds: float, *, is_foreign: bool) -> None:
     """Logs of every platform, noises in turn; goes on where it was stopped."""
     path = kept(kind, is_foreign=is_foreign)
     path.parent.mkdir(exist_ok=True)
@@ -96,7 +96,7 @@ def make_logs(count: int, kind: str, *, is_foreign: bool) -> None:
             key = platform, seed
             if key not in found:
                 noise = noises[(seed + index) % len(noises)]
-                found[key] = made(platform, 2000 + seed, kind, noise)
+                found[key] = made(platform, 2000 + seed, kind, noise, seconds)
                 path.write_bytes(pickle.dumps(found))
     print(f"{len(found)} logs in {path}")
 
@@ -354,13 +354,14 @@ def main() -> None:
     parser.add_argument("--drift", type=float, default=0.0)
     parser.add_argument("--constants", type=int, default=0)
     parser.add_argument("--off", type=float, default=0.0)
+    parser.add_argument("--seconds", type=float, default=SECONDS)
     parser.add_argument("--days", type=Path)
     parser.add_argument("--store", type=Path)
     parser.add_argument("--kind", default="georeference", choices=["georeference", "position"])
     parser.add_argument("--foreign", action="store_true")
     asked = parser.parse_args()
     if asked.what == "logs":
-        make_logs(asked.count, asked.kind, is_foreign=asked.foreign)
+        make_logs(asked.count, asked.kind, asked.seconds, is_foreign=asked.foreign)
     elif asked.what == "power":
         power(asked.sets, is_foreign=asked.foreign)
     elif asked.what == "cover":

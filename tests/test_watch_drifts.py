@@ -16,7 +16,7 @@ from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.oddities import DIFFERS
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.possible_changes import PossibleChange, PossibleChanges
-from syncline_design.campaign.scatter import scattered
+from syncline_design.campaign.scatter import EffectInRuns, RunScatter, scattered
 from syncline_design.campaign.seen import Seen
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.strangers import share_of
@@ -127,6 +127,44 @@ def test_scatter_beside_a_trend_is_that_of_a_weighted_fit() -> None:
         left = np.linalg.lstsq(design, np.sqrt(sizes) * values, rcond=None)
         residual = np.sqrt(sizes) * values - design @ left[0]
         assert found[row] == pytest.approx(float(residual @ residual), abs=1e-9)
+
+
+def test_scatter_beside_a_change_that_went_back_is_that_of_a_weighted_fit() -> None:
+    """The same of a mean and what some runs on end have besides; no run of one's own, no end."""
+    rng = np.random.default_rng(69)
+    count, inside = 7, 1.7
+    sizes = rng.uniform(0.5, 4.0, (count, 1))
+    values = rng.standard_normal((count, 1))
+    runs = EffectInRuns(sizes[:, :, None, None], (sizes * values)[:, :, None],
+                        np.ones((count, 1), dtype=np.int64), np.array([inside]))  # fmt: skip
+    square, free = RunScatter(
+        np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), runs
+    ).beside_passing(0)
+    spans = [(a, b) for a in range(1, count) for b in range(a + 2, count)]
+    assert len(square) == len(spans) == 10
+    for (a, b), q in zip(spans, square, strict=True):
+        has = (np.arange(count) >= a) & (np.arange(count) < b)
+        design = np.column_stack([np.ones(count), has]) * np.sqrt(sizes)
+        fitted = np.linalg.lstsq(design, (np.sqrt(sizes) * values)[:, 0], rcond=None)
+        assert q == pytest.approx(float(fitted[1][0]) / inside, abs=1e-9)
+    assert free.tolist() == [5] * 10
+
+
+@pytest.mark.parametrize("beside", [0.0, 8.0])
+def test_a_repair_beside_another_change_is_no_scatter(beside: float) -> None:
+    """A latency of ten bounds from run 5 on until it is undone at run 8, alone or beside a bias
+    that stays: two changes of it, dated right, and none that scatters."""
+    for seed in range(4):
+        rng = np.random.default_rng([70, seed])
+        runs = [
+            statistics(rng, np.array([10.0 * (4 <= k < 7), beside * (k >= 6), 0, 0, 0]) * BOUND)
+            for k in range(11)
+        ]
+        seen = seen_in(runs)
+        assert not Changes(pool_of(runs, range(11))).differing(11)
+        latency = [one.change for one in seen if one.change.term.label[0] == "latency"]
+        assert [one.k for one in latency] == [4, 7]
+        assert len(seen) == len(latency) + (beside > 0.0)
 
 
 def test_trends_are_steps_and_then_what_grows_by_one_with_every_run() -> None:

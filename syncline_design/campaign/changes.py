@@ -53,6 +53,7 @@ from syncline_design.campaign.pool import Pool, Term, inverted
 from syncline_design.campaign.run_records import Change, Differing, Freed, Runs, SameSize
 from syncline_design.campaign.scatter import (
     APART,
+    EffectInRuns,
     RunScatter,
     freed_of,
     log_bayes,
@@ -332,7 +333,7 @@ class Changes:
         """The effect in which the first `look` runs most clearly are not all alike, by whatever
         change or scatter; None where noise would do."""
         runs = self.compared(look)
-        every = [replace(one, square=one.square[-1:], free=one.free[-1:]) for one in runs.whole]
+        every = [one.of_all for one in runs.whole]
         return clearly_differing(self.terms, self.groups, runs.normal, every, every)
 
     def likeliest(self, look: int) -> Change | None:
@@ -365,9 +366,9 @@ class Changes:
             blocks = normal[:, *g.blocks]
             squares = scattered(blocks, inverted(blocks), left[:, g.index])
             seen = np.sum(np.einsum("rgaa->rga", blocks) > 0.0, axis=-1)
-            found.append(
-                RunScatter.of(squares / self.inside(look)[g.terms], seen, g.index.shape[1])
-            )
+            inside = self.inside(look)[g.terms]
+            own = EffectInRuns(blocks, left[:, g.index], seen, inside)
+            found.append(RunScatter.of(squares / inside, own))
         return Runs(normal, score, total, inverse, tuple(found))
 
     def total(self, look: int, normal: Array, score: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -42,7 +42,8 @@ class Seen:
 
 
 def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, ...]:
-    """What changed in runs of which the look after `first` of them rang, the strongest first."""
+    """What changed in runs of which the look after `first` of them rang: the strongest first, and
+    of one effect in the order of the runs."""
     told = list(what_changed(changes, first, threshold))
     count = changes.pool.count
     while True:
@@ -50,7 +51,7 @@ def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, 
         weakest = min(range(len(told)), key=lambda k: _explained(fitted[k]))
         if _explained(fitted[weakest]) >= threshold:
             seen = [_seen(changes, told, k, fitted, first) for k in range(len(told))]
-            return tuple(_with_ends(seen))
+            return tuple(_in_order(_with_ends(seen)))
         if len(told) == 1:
             return (_went_back(changes, told[0], first),)
         told.pop(weakest)
@@ -68,6 +69,15 @@ def _with_ends(seen: Sequence[Seen]) -> list[Seen]:
             kept[kept.index(begun)] = one
             kept.remove(ended)
     return kept
+
+
+def _in_order(seen: Sequence[Seen]) -> Iterator[Seen]:
+    """The same places, changes of one effect in them in the order of their runs."""
+    labels = [one.change.term.label for one in seen]
+    later = sorted(seen, key=lambda one: one.change.k, reverse=True)
+    waiting = {label: [o for o in later if o.change.term.label == label] for label in labels}
+    for label in labels:
+        yield waiting[label].pop()
 
 
 def _ends(begun: Change, ended: Change) -> bool:
