@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import syncline_design.campaign.trends as trends_module
+import syncline_design.campaign.what_changed as what_changed_module
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.oddities import DIFFERS
@@ -21,7 +22,7 @@ from syncline_design.campaign.seen import Seen
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.strangers import share_of
 from syncline_design.campaign.trends import Trend, shapes, trends
-from syncline_design.campaign.what_changed import refined
+from syncline_design.campaign.what_changed import refined, what_changed
 from syncline_design.diagnosis.sufficient import Sufficient
 from syncline_design.effects import registry
 from tests.watched_series import (
@@ -300,6 +301,18 @@ def test_one_trend_is_told_where_two_explain_no_more() -> None:
         (one,) = refined(PossibleChanges(changes, 10, (), known), two)
         assert (one.effect, one.trend.kind) == (latency, "drift")
         assert one.trend.k in (1, 2)
+
+
+def test_a_search_in_which_one_stands_for_two_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two clear changes, of which one is told in the place of both whenever both are known."""
+    runs = drifting(3, 9, 0.0, 1)
+    moved = np.array([20.0, 25.0, 0, 0, 0]) * BOUND
+    rng = np.random.default_rng(71)
+    runs = [*runs[:5], *(statistics(rng, moved) for _ in range(4))]
+    changes = Changes(pool_of(runs, range(9)))
+    assert len(what_changed(changes, 6, ALARM)) > 1
+    monkeypatch.setattr(what_changed_module, "_held_against_others", lambda _, __, found: found[:1])
+    assert len(what_changed(changes, 6, ALARM)) == 1
 
 
 def test_whatever_changed_is_told_at_every_look() -> None:

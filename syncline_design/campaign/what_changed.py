@@ -50,7 +50,9 @@ def what_changed(changes: Changes, first: int, threshold: float) -> tuple[Taken,
     found: list[PossibleChange] = []
     fitted: list[Change] = []
     evidence: list[float] = []
-    while len(found) < MOST_CHANGES:
+    had: set[frozenset[PossibleChange]] = set()
+    while len(found) < MOST_CHANGES and frozenset(found) not in had:
+        had.add(frozenset(found))
         state, at, only = _beside(changes, fitted), look, None
         total = state.log_evidence(at)[0]
         if not found and total < threshold:  # an alarm stays, by what it rang with
@@ -63,9 +65,9 @@ def what_changed(changes: Changes, first: int, threshold: float) -> tuple[Taken,
                 break
         one = _next(changes, fitted, found, at, only)
         found, evidence = [*found, one], [*evidence, total]
-        if at == look:
+        if at == look:  # one in the place of two may call for the second of them again: `had`
             found = _held_against_others(changes, _fits(changes, fitted, found, look), found)
-            evidence += [total] * (len(found) - len(evidence))
+            evidence = [*evidence, *[total] * len(found)][: len(found)]
         fitted = _fits(changes, fitted, found, look)
     return tuple(Taken(*pair) for pair in zip(found, evidence, strict=True))
 
