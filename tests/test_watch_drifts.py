@@ -15,9 +15,10 @@ import syncline_design.campaign.what_changed as what_changed_module
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.compared_runs import ComparedRuns
 from syncline_design.campaign.oddities import DIFFERS
+from syncline_design.campaign.passing import taken_by_passing
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.possible_changes import PossibleChange, PossibleChanges
-from syncline_design.campaign.scatter import EffectInRuns, RunScatter, scattered
+from syncline_design.campaign.scatter import EffectInRuns, scattered
 from syncline_design.campaign.seen import Seen
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.strangers import share_of
@@ -133,22 +134,23 @@ def test_scatter_beside_a_trend_is_that_of_a_weighted_fit() -> None:
 def test_scatter_beside_a_change_that_went_back_is_that_of_a_weighted_fit() -> None:
     """The same of a mean and what some runs on end have besides; no run of one's own, no end."""
     rng = np.random.default_rng(69)
-    count, inside = 7, 1.7
+    count = 7
     sizes = rng.uniform(0.5, 4.0, (count, 1))
     values = rng.standard_normal((count, 1))
     runs = EffectInRuns(sizes[:, :, None, None], (sizes * values)[:, :, None],
-                        np.ones((count, 1), dtype=np.int64), np.array([inside]))  # fmt: skip
-    square, free = RunScatter(
-        np.ones((1, 1)), np.ones((1, 1)), np.ones((1, 1)), runs
-    ).beside_passing(0)
-    spans = [(a, b) for a in range(1, count) for b in range(a + 2, count)]
-    assert len(square) == len(spans) == 10
-    for (a, b), q in zip(spans, square, strict=True):
+                        np.ones((count, 1), dtype=np.int64))  # fmt: skip
+
+    def left(*columns: np.ndarray) -> float:
+        design = np.column_stack([np.ones(count), *columns]) * np.sqrt(sizes)
+        return float(np.linalg.lstsq(design, (np.sqrt(sizes) * values)[:, 0], rcond=None)[1][0])
+
+    taken, begun, ended = taken_by_passing(runs)
+    assert len(taken) == 10
+    assert np.all(ended - begun >= 2)
+    assert ended.max() < count
+    for a, b, q in zip(begun, ended, taken[:, 0], strict=True):
         has = (np.arange(count) >= a) & (np.arange(count) < b)
-        design = np.column_stack([np.ones(count), has]) * np.sqrt(sizes)
-        fitted = np.linalg.lstsq(design, (np.sqrt(sizes) * values)[:, 0], rcond=None)
-        assert q == pytest.approx(float(fitted[1][0]) / inside, abs=1e-9)
-    assert free.tolist() == [5] * 10
+        assert q == pytest.approx(left() - left(has.astype(float)), abs=1e-9)
 
 
 @pytest.mark.parametrize("beside", [0.0, 8.0])

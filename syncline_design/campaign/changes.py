@@ -32,7 +32,7 @@ e-processes; Shin, Ramdas, Rinaldo, New England J. Stat. Data Sci. 2 (2024), on 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Final
@@ -49,6 +49,7 @@ from syncline_design.campaign.freed_runs import (
     with_own_free,
 )
 from syncline_design.campaign.looks import KeptLook
+from syncline_design.campaign.passing import passing_change
 from syncline_design.campaign.pool import Pool, Term, inverted
 from syncline_design.campaign.run_records import Change, Differing, Freed, Runs, SameSize
 from syncline_design.campaign.scatter import (
@@ -309,25 +310,39 @@ class Changes:
         """The first `look` runs, what clearly differs from one to the next freed in each.
 
         What the likeliest change makes is no scatter, of its own effect or of one that moves the
-        runs alike.
+        runs alike; nor what that and one that went back make together, or such a one alone.
         """
         if look not in self._latest:
-            found = self._compared(look, *with_beside(self.pool, look, self.beside))
-            whole = found.scatters
-            likely = self._likeliest_of(look, found) if look > 2 else None
-            if likely is not None:
-                found = self._compared(look, found.normal, found.score, likely)
-            for _ in range(MOST_SCATTERED):
-                now = found.normal, found.scatters, whole
-                one = clearly_differing(self.terms, self.groups, *now)
-                if one is None:
-                    break
+            first = self._compared(look, *with_beside(self.pool, look, self.beside))
+            likely = self._likeliest_of(look, first) if look > 2 else None
+            off = () if likely is None else (likely,)
+            found = self._compared(look, first.normal, first.score, *off)
+            one = self._clear(found, whole := first.scatters)
+            if one is not None:
+                passing = self._beside_passing(look, first, found, off)
+                found, one = next(((runs, None) for runs in passing), (found, one))
+            while one is not None and len(found.freed) < MOST_SCATTERED:
                 freed = (*found.freed, one)
                 own = freed_of(found.normal, found.score, one.term.index, one.covariance)
-                found = replace(self._compared(look, *own, likely), freed=freed)
+                found = replace(self._compared(look, *own, *off), freed=freed)
+                one = self._clear(found, whole)
             self._latest.clear()
             self._latest[look] = replace(found, whole=whole)
         return self._latest[look]
+
+    def _clear(self, runs: Runs, whole: Sequence[RunScatter]) -> Differing | None:
+        return clearly_differing(self.terms, self.groups, runs.normal, runs.scatters, whole)
+
+    def _beside_passing(
+        self, look: int, first: Runs, found: Runs, off: tuple[Change, ...]
+    ) -> Iterator[Runs]:
+        """Runs that do not differ beside a change that went back, beside the likeliest or alone."""
+        for known, runs in ((off, found), ((), first)):
+            one = passing_change(self.terms, self.groups, runs.scatters)
+            if one is not None:
+                less = self._compared(look, first.normal, first.score, *known, one)
+                if self._clear(less, first.scatters) is None:
+                    yield less
 
     def apart(self, look: int) -> Differing | None:
         """The effect in which the first `look` runs most clearly are not all alike, by whatever
@@ -350,25 +365,20 @@ class Changes:
         """Effects that clearly differ from run to run, of the first `look` runs."""
         return self.compared(look).freed
 
-    def _compared(
-        self, look: int, normal: Array, score: Array, likely: Change | None = None
-    ) -> Runs:
+    def _compared(self, look: int, normal: Array, score: Array, *likely: Change) -> Runs:
         """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
-        together, less what a likely change makes; beside every course of the effect, and alone."""
+        together, less what likely changes make; beside every course of the effect, and alone."""
         total = self.total(look, normal, score)
         inverse = pseudo_inverse(total)
-        left = score
-        if likely is not None:
-            left = score - likely.made(normal)
+        left = score - sum(one.made(normal) for one in likely)
         left = left - normal @ (inverse @ left.sum(axis=0))
         found = []
         for g in self.groups:
             blocks = normal[:, *g.blocks]
             squares = scattered(blocks, inverted(blocks), left[:, g.index])
             seen = np.sum(np.einsum("rgaa->rga", blocks) > 0.0, axis=-1)
-            inside = self.inside(look)[g.terms]
-            own = EffectInRuns(blocks, left[:, g.index], seen, inside)
-            found.append(RunScatter.of(squares / inside, own))
+            own = EffectInRuns(blocks, left[:, g.index], seen)
+            found.append(RunScatter.of(squares / self.inside(look)[g.terms], own))
         return Runs(normal, score, total, inverse, tuple(found))
 
     def total(self, look: int, normal: Array, score: Array) -> Array:

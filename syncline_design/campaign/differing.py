@@ -14,7 +14,6 @@ from syncline_design.campaign.scatter import RunScatter
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
-from syncline_design.machine.quick_dataclass import dataclass
 
 SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
 MOSTLY: Final = 0.8  # of what one differs by that another would explain in its place
@@ -27,69 +26,6 @@ def _own_covariance(normal: Array, term: Term) -> Array:
     return inverted(normal[np.ix_(term.index, term.index)])
 
 
-@dataclass(frozen=True, eq=False)
-class Beyond:
-    """How far the runs scatter beyond noise in each effect, (C,) each.
-
-    clear: standard deviations of Q; excess: variance over that of noise; over: Q over what is
-    expected; chance: log of that of noise.
-    """
-
-    clear: Array
-    excess: Array
-    over: Array
-    chance: Array
-
-    @classmethod
-    def of(
-        cls,
-        count: int,
-        groups: Sequence[SameSize],
-        scatters: Sequence[RunScatter],
-        most: Sequence[RunScatter],
-    ) -> Beyond:
-        """Beside any one change."""
-        found = cls(*(np.zeros(count) for _ in range(4)))
-        for g, scatter, alone in zip(groups, scatters, most, strict=True):
-            least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
-            found.clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
-            # the least of so many is less than scatter leaves, as chi-square goes by 2 log of them
-            searched = np.maximum(free - 2.0 * math.log(len(scatter.square)), 1.0)
-            whole = alone.square[-1] / np.maximum(alone.free[-1], 1)
-            excess = np.where(free > 0.0, np.minimum(least / searched, whole), 0.0) - 1.0
-            found.excess[g.terms] = excess
-            found.over[g.terms] = np.where(free > 0.0, least - free, 0.0)
-            pairs = zip(least, free, strict=True)
-            found.chance[g.terms] = [
-                log_p_of(float(q), int(f)) if f > 0.0 else 0.0 for q, f in pairs
-            ]
-        return found
-
-    def clearest(
-        self, groups: Sequence[SameSize], ways: Sequence[Sequence[RunScatter]]
-    ) -> int | None:
-        """The effect that clearly differs and most so, beside changes that went back, too, in runs
-        as they are and less the likeliest change."""
-        held: set[int] = set()
-        while True:
-            best = int(np.argmax(self.clear))
-            if not self.clear[best] > SCATTERED:
-                return None
-            if best in held:
-                return best
-            held.add(best)
-            for scatters in ways:
-                for g, scatter in zip(groups, scatters, strict=True):
-                    for place in np.flatnonzero(g.terms == best):
-                        self._beside_passing(best, scatter, int(place))
-
-    def _beside_passing(self, term: int, scatter: RunScatter, place: int) -> None:
-        square, free = scatter.beside_passing(place)
-        if square.size:
-            clear = (square - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
-            self.clear[term] = min(float(self.clear[term]), float(clear.min()))
-
-
 def clearly_differing(
     terms: Sequence[Term],
     groups: Sequence[SameSize],
@@ -98,27 +34,36 @@ def clearly_differing(
     most: Sequence[RunScatter],
 ) -> Differing | None:
     """The effect that differs most clearly from run to run; None where noise would do.  One change
-    of it is none, of any course that the scatters know, nor one that went back.
+    of it is none, of any course that the scatters know.
 
     normal (look, P, P): information of the runs; scatters: by group.  most: before any change was
     taken off, by which they differ at most.
     """
     if not terms:
         return None
-    beyond = Beyond.of(len(terms), groups, scatters, most)
-    best = beyond.clearest(groups, (scatters, most))
-    if best is None:
+    clear, excess, chance, beyond = (np.zeros(len(terms)) for _ in range(4))
+    for g, scatter, alone in zip(groups, scatters, most, strict=True):
+        least, free = scatter.square.min(axis=0), scatter.free.min(axis=0)
+        clear[g.terms] = (least - free) / np.sqrt(2.0 * np.maximum(free, 1.0))
+        # the least of so many is less than scatter leaves, by some 2 log of them as chi-square goes
+        searched = np.maximum(free - 2.0 * math.log(len(scatter.square)), 1.0)
+        whole = alone.square[-1] / np.maximum(alone.free[-1], 1)
+        excess[g.terms] = np.where(free > 0.0, np.minimum(least / searched, whole), 0.0) - 1.0
+        beyond[g.terms] = np.where(free > 0.0, least - free, 0.0)
+        pairs = zip(least, free, strict=True)
+        chance[g.terms] = [log_p_of(float(q), int(f)) if f > 0.0 else 0.0 for q, f in pairs]
+    best = int(np.argmax(clear))
+    if not clear[best] > SCATTERED:
         return None
-    clear, excess, over = beyond.clear, beyond.excess, beyond.over
     alike = np.flatnonzero(clear > clear[best] - AS_CLEAR)
     named = min(map(int, alike), key=lambda k: commonness(terms[k].label))
     usual = normal.mean(axis=0)
-    others = [int(k) for k in np.argsort(-over) if over[k] >= MOSTLY * over.max()]
+    others = [int(k) for k in np.argsort(-beyond) if beyond[k] >= MOSTLY * beyond.max()]
     return Differing(
         terms[best],
         excess[best] * _own_covariance(usual, terms[best]),
         terms[named],
         excess[named] * _own_covariance(usual, terms[named]),
-        float(beyond.chance[named]) + math.log(len(terms)),
+        float(chance[named]) + math.log(len(terms)),
         tuple(terms[k] for k in others if k != named)[:MOST_OTHERS],
     )

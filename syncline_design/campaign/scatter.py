@@ -16,26 +16,16 @@ RUNS_KNOWN: Final = 17.0  # runs that the noise fitted counts for, against the s
 APART: Final = (1.0, 3.0)  # bounds of a run by which an effect may differ from run to run
 DIFFERING: Final = 0.3  # odds of some effect differing from run to run against none doing so
 ROUNDED: Final = 1e-12
-SHORTEST: Final = 2  # runs that have a change which went back; one alone is an odd one
 
 
 @dataclass(frozen=True, slots=True)
 class EffectInRuns:
     """Information (n, G, p, p) of single runs about the terms of a group and its score (n, G, p),
-    all that is common taken off; seen (n, G): parameters that each run says anything of; inside
-    (G,): variance inside runs over that fitted."""
+    all that is common taken off; seen (n, G): parameters that each run says anything of."""
 
     normal: Array
     score: Array
     seen: Index
-    inside: Array
-
-    def alone(self, g: int) -> EffectInRuns:
-        """The same of one term."""
-        own = slice(g, g + 1)
-        return EffectInRuns(
-            self.normal[:, own], self.score[:, own], self.seen[:, own], self.inside[own]
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +34,13 @@ class RunScatter:
 
     square, free: R and its free values f.  factor: their variance over that fitted as far as it is
     known, R taken as f at least, for what the noise inside runs makes is always there.
-    runs: what these are of; None: no changes that went back are held against them.
+    runs: what these are of.
     """
 
     factor: Array
     square: Array
     free: Index
-    runs: EffectInRuns | None = None
+    runs: EffectInRuns
 
     @classmethod
     def of(cls, squares: Array, runs: EffectInRuns) -> RunScatter:
@@ -67,23 +57,7 @@ class RunScatter:
     @property
     def of_all(self) -> RunScatter:
         """Beside no change at all."""
-        return RunScatter(self.factor[-1:], self.square[-1:], self.free[-1:])
-
-    def beside_passing(self, g: int) -> tuple[Array, Array]:
-        """R and f of one term beside changes that went back, which some runs have on end, (B,)."""
-        if self.runs is None:
-            return np.zeros(0), np.zeros(0)
-        own = self.runs.alone(g)
-        count, size = own.score.shape[0], own.score.shape[2]
-        spans = [(a, b) for a in range(1, count) for b in range(a + SHORTEST, count)]
-        begun, ended = np.array(spans, dtype=np.int64).reshape(-1, 2).T
-        total = own.normal.sum(axis=0), own.score.sum(axis=0), own.seen.sum(axis=0)
-        inside = [_between(of, begun, ended) for of in (own.normal, own.score, own.seen)]
-        outside = [whole - part for whole, part in zip(total, inside, strict=True)]
-        explained = _explained(inside[0], inside[1]) + _explained(outside[0], outside[1])
-        square = np.einsum("rga,rgab,rgb->g", own.score, inverted(own.normal), own.score)
-        free = sum(np.maximum(part[2] - size, 0) for part in (inside, outside))
-        return np.maximum(square - explained, 0.0)[:, 0] / own.inside[0], np.asarray(free)[:, 0]
+        return RunScatter(self.factor[-1:], self.square[-1:], self.free[-1:], self.runs)
 
 
 def scattered(normals: Array, inverses: Array, scores: Array) -> Array:
@@ -99,13 +73,6 @@ def scattered(normals: Array, inverses: Array, scores: Array) -> Array:
     drifts = explained[-1] + _explained(*_lines(normals, scores))
     found: Array = square - np.concatenate([explained[:-1] + after, drifts, explained[-1:]])
     return np.maximum(found, 0.0)
-
-
-def _between(values: Array | Index, begun: Index, ended: Index) -> Array:
-    """Sums over the runs from one to before another, (B, ...)."""
-    before = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
-    found: Array = before[ended] - before[begun]
-    return found
 
 
 def _lines(normals: Array, scores: Array) -> tuple[Array, Array]:

@@ -15,12 +15,14 @@ from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.charts_ways import from_above
 from syncline_design.report.palette import INK, MUTED, SERIES
+from syncline_design.report.plan_sentences import parameter
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_POINTS = 2000
+LEGEND_ROW = 18.0
 FAR = 1e6  # times what is asked: not seen yet, and off the scale
 
 
@@ -98,9 +100,9 @@ def after(found: Plan) -> InlineChart:
         axes = add_axes(figure)
         for k, key in enumerate(keys):
             axes.plot(legs, _ratios(found, key), marker="o", markersize=3.5,
-                      color=SERIES[k % len(SERIES)], label=key)  # fmt: skip
+                      color=SERIES[k % len(SERIES)], label=parameter(key))  # fmt: skip
             for leg, ratio in zip(legs, _ratios(found, key), strict=True):
-                tell(axes, leg, min(ratio, FAR), [("Leg", str(leg)), ("Effect", key),
+                tell(axes, leg, min(ratio, FAR), [("Leg", str(leg)), ("Effect", parameter(key)),
                      ("Sigma over asked", numbers.number(ratio, 3))])  # fmt: skip
         axes.axhline(1.0, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
@@ -110,12 +112,14 @@ def after(found: Plan) -> InlineChart:
         axes.set_xticks(legs)
         axes.set_xlabel("leg")
         axes.set_ylabel("sigma / asked")
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.24), ncols=2)
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
         scales.grid(axes, "y")
 
-    last = "; ".join(f"{key} {numbers.number(_ratios(found, key)[-1], 2)}" for key in keys)
+    last = "; ".join(
+        f"{parameter(key)} {numbers.number(_ratios(found, key)[-1], 2)}" for key in keys
+    )
     return draw("fig-after", "Sigma over what is asked", f"after the last leg {last}",
-                (WIDTH, 260.0), build)  # fmt: skip
+                (WIDTH, 220.0 + LEGEND_ROW * math.ceil(len(keys) / 2)), build)  # fmt: skip
 
 
 def _ratios(found: Plan, key: str) -> Sequence[float]:

@@ -39,13 +39,14 @@ from syncline_design.report.plan_sentences import (
     sentences,
     would_take,
 )
-from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.table import Cell, Table, table, turned
 from syncline_design.report.text import visible
 from syncline_design.report.words import effect_words
 
 Row = tuple[Cell | str, ...]
 STANDS_MPS: Final = 0.01  # below which a vehicle is at rest
 MOST_TARGETS: Final = 12  # told outside the page
+MOST_COLUMNS: Final = 6
 
 
 def on_plan(run: PlanRun) -> Document:
@@ -123,16 +124,23 @@ def _after(found: Plan) -> list[Node]:
     rows.append(row("all effects free", found.after[-1].sigma_all))
     heads = ("After leg", *(f"{parameter(k)} #" for k in keys), f"{pair_head(found)} #")
     note = (
-        "Standard uncertainties with what is asked and the noise free; the last row with every "
-        "effect free that this system can have, within its prior. What has a double (the latencies "
-        "of all sensors together, the two lever arms) stays at its prior there, whatever is driven."
+        "Standard uncertainties with what is asked and the noise free; "
+        "\u201call effects free\u201d is with every effect free that this system can have, within "
+        "its prior. What has a double (the latencies of all sensors together, the two lever arms) "
+        "stays at its prior there, whatever is driven."
         f"{_without_rival(found)}"
     )
-    nodes = show(table("After each leg", heads, rows, note), silent=True)
+    nodes = show(_fitting(table("After each leg", heads, rows, note)), silent=True)
     if not found.tolerance or len(found.after) < 2:
         return nodes
     caption = "Standard uncertainty over what is asked, after each leg."
     return [*nodes, Chart("after", partial(drawings.after, found), caption)]
+
+
+def _fitting(one: Table) -> Table:
+    """A table of more parameters than a page is wide has a row for each of them."""
+    is_wide = len(one.heads) > MOST_COLUMNS and len(one.heads) > len(one.rows)
+    return turned(one, "Parameter") if is_wide else one
 
 
 def _without_rival(found: Plan) -> str:
@@ -196,7 +204,7 @@ def _standard(found: Plan) -> list[Node]:
         "it from. Line plans are taken line by line in their order; the turns between lines count "
         "as time, and are not logged. Standard uncertainties in the time of this drive."
     )
-    return show(table("Beside the standard line plans", heads, rows, note), silent=True)
+    return show(_fitting(table("Beside the standard line plans", heads, rows, note)), silent=True)
 
 
 def _standard_row(

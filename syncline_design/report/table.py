@@ -74,6 +74,17 @@ def table(
     return Table(caption, shown, tuple(zip(*columns, strict=True)), note, named_by)
 
 
+def turned(one: Table, corner: str) -> Table:
+    """The same with rows for columns, less those that say nothing; corner: what heads the first."""
+    heads = (Head(corner), *(Head(cell_words(row[0]), True) for row in one.rows))
+    rows = tuple(
+        (Cell(head.text), *column)
+        for head, column in zip(one.heads[1:], list(zip(*one.rows, strict=True))[1:], strict=True)
+        if any(cell.text for cell in column)
+    )
+    return Table(one.caption, heads, rows, one.note)
+
+
 def _alike(column: Sequence[Cell]) -> Sequence[Cell]:
     """A column of figures, all to the same place or to the same number of digits."""
     texts = worded(alike([(cell.text, None if cell.written else cell.sort) for cell in column]))
