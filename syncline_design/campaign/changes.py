@@ -181,19 +181,18 @@ class Changes:
 
     def log_odds(self, look: int) -> Array:
         """log p_a L_a of every effect, by each of APART, (C, S)."""
-        runs, inside = self.compared(look), self.inside(look)
-        prior = runs.total - runs.normal.sum(axis=0)
+        return self._log_odds(look, self.compared(look))
+
+    def _log_odds(self, look: int, runs: Runs, *off: Change) -> Array:
+        """The same of runs less what changes make."""
+        inside, prior = self.inside(look), runs.total - runs.normal.sum(axis=0)
+        score = runs.score - sum(one.made(runs.normal) for one in off)
         usual = runs.normal.mean(axis=0)
         found = np.zeros((len(self.terms), len(APART)))
         for k, (term, factor) in enumerate(zip(self.terms, inside, strict=True)):
-            by = log_differing(
-                runs.normal / factor,
-                runs.score / factor,
-                prior / factor,
-                term.index,
-                inverted(usual[np.ix_(term.index, term.index)]) * factor,
-            )
-            found[k] = log_odds_apart(len(self.terms)) + by
+            spread = inverted(usual[np.ix_(term.index, term.index)]) * factor
+            own = runs.normal / factor, score / factor, prior / factor
+            found[k] = log_odds_apart(len(self.terms)) + log_differing(*own, term.index, spread)
         return found
 
     @cached_property
@@ -336,10 +335,11 @@ class Changes:
     def _beside_passing(
         self, look: int, first: Runs, found: Runs, off: tuple[Change, ...]
     ) -> Iterator[Runs]:
-        """Runs that do not differ beside a change that went back, beside the likeliest or alone."""
+        """Runs that do not differ beside a change that went back, beside the likeliest or alone,
+        where that is likelier than any effect that differs from run to run."""
         for known, runs in ((off, found), ((), first)):
             one = passing_change(self.terms, self.groups, runs.scatters)
-            if one is not None:
+            if one is not None and one.log_factor > self._log_odds(look, first, *known).max():
                 less = self._compared(look, first.normal, first.score, *known, one)
                 if self._clear(less, first.scatters) is None:
                     yield less
@@ -377,8 +377,9 @@ class Changes:
             blocks = normal[:, *g.blocks]
             squares = scattered(blocks, inverted(blocks), left[:, g.index])
             seen = np.sum(np.einsum("rgaa->rga", blocks) > 0.0, axis=-1)
-            own = EffectInRuns(blocks, left[:, g.index], seen)
-            found.append(RunScatter.of(squares / self.inside(look)[g.terms], own))
+            inside = self.inside(look)[g.terms]
+            own = EffectInRuns(blocks, left[:, g.index], seen, inside)
+            found.append(RunScatter.of(squares / inside, own))
         return Runs(normal, score, total, inverse, tuple(found))
 
     def total(self, look: int, normal: Array, score: Array) -> Array:

@@ -3,12 +3,16 @@
 What some runs on end have beside the others, from the run a to before the run b,
     d = N_in^-1 s_in - N_out^-1 s_out,
 N and s the sums of an effect's information and score over the runs inside and outside.  It takes
-s_in' N_in^-1 s_in + s_out' N_out^-1 s_out - s' N^-1 s of the scatter of all of them (Cochran's Q).
+s_in' N_in^-1 s_in + s_out' N_out^-1 s_out - s' N^-1 s of the scatter of all of them (Cochran's Q):
+half of that, by the variance inside runs, less a nat a value and the log of how many are tried, is
+its log factor, to be held against the odds of an effect that differs.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -26,17 +30,19 @@ def passing_change(
     terms: Sequence[Term], groups: Sequence[SameSize], scatters: Sequence[RunScatter]
 ) -> Change | None:
     """Of any effect the change that went back which takes most of the scatter; None of few runs."""
-    best: tuple[float, Change] | None = None
+    best: Change | None = None
     for g, scatter in zip(groups, scatters, strict=True):
         if len(scatter.runs.normal) < SHORTEST + 2:
             return None
         taken, begun, ended = taken_by_passing(scatter.runs)
-        for place, term in enumerate(g.terms):
-            row = int(np.argmax(taken[:, place]))
-            if best is None or taken[row, place] > best[0]:
-                one = _fitted(terms[term], scatter.runs, place, int(begun[row]), int(ended[row]))
-                best = float(taken[row, place]), one
-    return None if best is None else best[1]
+        tried = g.index.shape[1] + math.log(len(terms) * len(begun))
+        factors = 0.5 * taken / scatter.runs.inside - tried
+        row, place = np.unravel_index(int(np.argmax(factors)), factors.shape)
+        if best is None or factors[row, place] > best.log_factor:
+            span = int(begun[row]), int(ended[row])
+            one = _fitted(terms[g.terms[place]], scatter.runs, int(place), *span)
+            best = replace(one, log_factor=float(factors[row, place]))
+    return best
 
 
 def taken_by_passing(runs: EffectInRuns) -> tuple[Array, Index, Index]:

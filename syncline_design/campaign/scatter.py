@@ -21,11 +21,13 @@ ROUNDED: Final = 1e-12
 @dataclass(frozen=True, slots=True)
 class EffectInRuns:
     """Information (n, G, p, p) of single runs about the terms of a group and its score (n, G, p),
-    all that is common taken off; seen (n, G): parameters that each run says anything of."""
+    all that is common taken off; seen (n, G): parameters that each run says anything of; inside
+    (G,): variance inside runs over that fitted."""
 
     normal: Array
     score: Array
     seen: Index
+    inside: Array
 
 
 @dataclass(frozen=True, slots=True)
