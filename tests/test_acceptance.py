@@ -206,6 +206,33 @@ def test_a_bias_that_slower_noise_could_leave_breaks_no_figure(
 
 
 @pytest.mark.parametrize(
+    ("seconds", "low", "status"),
+    [(120.0, 0.7, "not_shown"), (120.0, 0.95, "broken"), (1200.0, 0.7, "broken")],
+)
+def test_a_heading_drift_that_slower_noise_could_leave_breaks_no_figure(
+    found: Diagnosis, seconds: float, low: float, status: str
+) -> None:
+    """5 deg/h is 0.083 deg off at the ends of two minutes, 0.83 deg at those of twenty; of 0.1 deg
+    0.71 is left to slow noise beside 0.7 of the figure, 0.31 beside 0.95: 0.14 and 0.061 deg."""
+    case = load(EXAMPLE)
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    rate = math.radians(5.0) / 3600.0
+    part = replace(found.findings[0].parameters["latency_s"], value=rate, unit="rad/s",
+                   standard_uncertainty=0.2 * rate, interval95=None)  # fmt: skip
+    off = replace(found.findings[0], effect="heading_drift", sensor="attitude", also=None,
+                  parameters={"rate_radps": part}, material=True, aliases=())  # fmt: skip
+    assert off.kind == "cause"
+    sigma = math.radians(0.1)
+    split = NoiseFactors((NoiseFactor(1.0, low, 1.05, ("yaw",)),), (1.0,), (sigma, sigma, sigma))
+    one = next(a for a in assumptions(case, verdict) if (a.role, a.name) == ("attitude", "noise"))
+    sight = Sighted(found, factors={f"{one.stage}/attitude": split}, ends_s=(0.0, seconds))
+    told = replace(found, findings=(off,))
+    row = by_log(one, LogEvidence(told, OnPaper(case, ()), one.stage, sight=sight))
+    assert row.status == status, row
+    assert ("slower than this log" in row.words) == (status == "not_shown")
+
+
+@pytest.mark.parametrize(
     ("verdict", "low", "std_m", "status"),
     [
         ("unexplained", 0.0, 0.020, "not_shown"),

@@ -141,7 +141,7 @@ def _untold(words: Sequence[str]) -> Judgement:
 
 
 def _as_slow(within: Sequence[Finding]) -> str:
-    """A constant that noise slower than the log leaves as well."""
+    """A constant or a drift that noise slower than the log leaves as well."""
     said = "; ".join(finding.sentence for finding in within)
     return (f"{said}, within the figure: noise that is slower than this log leaves as much, and "
             "logs of other starts would tell")  # fmt: skip

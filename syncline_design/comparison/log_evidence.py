@@ -34,6 +34,7 @@ from syncline_design.model.distributions import chi_square_limit
 from syncline_design.model.normal import NORMAL_95
 
 _BIAS: Final = "bias_m"  # the parameter of a range that is off by a constant
+_RATE: Final = "rate_radps"  # that of a heading that drifts
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,11 +148,11 @@ class LogEvidence:
         part = of_finding(finding)
         if one.name == "mounting":
             return self._is_slow_turn(part)
-        return one.name == "noise" and self._is_slow_bias(part)
+        return one.name == "noise" and (self._is_slow_bias(part) or self._is_slow_drift(part))
 
     def _is_slow(self, part: Departing) -> bool:
         """Whether a sound sensor's noise that is slower than the log leaves as much."""
-        return self._is_slow_bias(part) or self._is_slow_turn(part)
+        return self._is_slow_bias(part) or self._is_slow_drift(part) or self._is_slow_turn(part)
 
     def _is_slow_turn(self, part: Departing) -> bool:
         """Whether a constant turn is no more than an attitude's figure leaves to such noise.
@@ -177,15 +178,28 @@ class LogEvidence:
         than the log: |b| <= 1.96 sigma sqrt(1 - f^2), f the least factor that the log itself shows.
         """
         bias = part.parameters.get(_BIAS)
+        if bias is None or registry()[part.effect].breaks != "noise":
+            return False
+        return abs(float(bias.value)) <= NORMAL_95 * self._slower(part, "range", 0)
+
+    def _is_slow_drift(self, part: Departing) -> bool:
+        """The same of a heading that drifts, by how far it is off at the ends of the log when it is
+        right in the middle: |r| T / 2."""
+        rate = part.parameters.get(_RATE)
+        ends = None if self.sight is None else self.sight.ends_s
+        if rate is None or ends is None or part.sensors != ("attitude",):
+            return False
+        off = 0.5 * abs(float(rate.value)) * (ends[1] - ends[0])
+        return off <= NORMAL_95 * self._slower(part, "yaw", -1)
+
+    def _slower(self, part: Departing, reading: str, place: int) -> float:
+        """Standard deviation that the figure of a reading leaves to noise slower than the log."""
         known = {} if self.sight is None else self.sight.factors
         own = known.get(f"{part.stage}/{part.sensors[0]}")
-        if own is None or bias is None or registry()[part.effect].breaks != "noise":
-            return False
-        part_of = next((f for f in own.parts if f.readings[:1] in ((), ("range",))), None)
-        if part_of is None:
-            return False
-        slower = math.sqrt(max(1.0 - part_of.low**2, 0.0)) * own.sigma[0]
-        return abs(float(bias.value)) <= NORMAL_95 * slower
+        found = [f for f in own.parts if not f.readings or reading in f.readings] if own else []
+        if own is None or not found:
+            return 0.0
+        return math.sqrt(max(1.0 - found[0].low ** 2, 0.0)) * float(own.sigma[place])
 
     def split(self, one: Assumed) -> NoiseFactors | None:
         """The noise of an assumption's sensor, by readings that have a figure of their own."""
