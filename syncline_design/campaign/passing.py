@@ -19,7 +19,7 @@ import numpy as np
 
 from syncline_design.campaign.pool import Index, Term, inverted
 from syncline_design.campaign.run_records import Change, SameSize
-from syncline_design.campaign.scatter import EffectInRuns, RunScatter
+from syncline_design.campaign.scatter import EffectInRuns, RunScatter, explained
 from syncline_design.campaign.trends import Trend
 from syncline_design.effects.record import Array
 
@@ -52,19 +52,14 @@ def taken_by_passing(runs: EffectInRuns) -> tuple[Array, Index, Index]:
     begun, ended = np.array(spans, dtype=np.int64).T
     normal, score = (_between(of, begun, ended) for of in (runs.normal, runs.score))
     whole, scores = runs.normal.sum(axis=0), runs.score.sum(axis=0)
-    taken = _explained(normal, score) + _explained(whole - normal, scores - score)
-    return taken - _explained(whole, scores), begun, ended
+    taken = explained(normal, score) + explained(whole - normal, scores - score)
+    return taken - explained(whole, scores), begun, ended
 
 
 def _between(values: Array, begun: Index, ended: Index) -> Array:
     """Sums over the runs from one to before another, (B, ...)."""
     before = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
     found: Array = before[ended] - before[begun]
-    return found
-
-
-def _explained(normal: Array, score: Array) -> Array:
-    found: Array = np.einsum("...a,...ab,...b->...", score, inverted(normal), score)
     return found
 
 

@@ -70,10 +70,10 @@ def scattered(normals: Array, inverses: Array, scores: Array) -> Array:
     """
     square = np.einsum("rga,rgab,rgb->g", scores, inverses, scores)
     before, moved = np.cumsum(normals, axis=0), np.cumsum(scores, axis=0)
-    explained = _explained(before, moved)
-    after = _explained(before[-1] - before[:-1], moved[-1] - moved[:-1])
-    drifts = explained[-1] + _explained(*_lines(normals, scores))
-    found: Array = square - np.concatenate([explained[:-1] + after, drifts, explained[-1:]])
+    common = explained(before, moved)
+    after = explained(before[-1] - before[:-1], moved[-1] - moved[:-1])
+    drifts = common[-1] + explained(*_lines(normals, scores))
+    found: Array = square - np.concatenate([common[:-1] + after, drifts, common[-1:]])
     return np.maximum(found, 0.0)
 
 
@@ -98,9 +98,9 @@ def freed_of(normal: Array, score: Array, index: Index, spread: Array) -> tuple[
     return 0.5 * (normal + np.swapaxes(normal, 1, 2)), score
 
 
-def _explained(normal: Array, score: Array) -> Array:
-    """s' N^-1 s."""
-    found: Array = np.einsum("kga,kgab,kgb->kg", score, inverted(normal), score)
+def explained(normal: Array, score: Array) -> Array:
+    """s' N^-1 s of N (..., p, p) and s (..., p)."""
+    found: Array = np.einsum("...a,...ab,...b->...", score, inverted(normal), score)
     return found
 
 

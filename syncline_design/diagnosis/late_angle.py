@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.candidates import candidates, plain_signatures
+from syncline_design.diagnosis.fitting import inner
 from syncline_design.diagnosis.frozen_channels import euler_rates
 from syncline_design.diagnosis.gross import Gross, expected_size, usual_size
 from syncline_design.diagnosis.judged import log_f
@@ -312,16 +313,11 @@ class _Looking:
         columns = root @ np.nan_to_num(every)
         left = np.einsum("nij,nj->ni", root, np.nan_to_num(error))
         parts = np.array_split(np.arange(len(error)), BLOCKS)
-        normal = np.array([_inner(columns[p], columns[p]) for p in parts])
+        normal = np.array([inner(columns[p], columns[p]) for p in parts])
         score = np.array([np.einsum("nik,ni->k", columns[p], left[p]) for p in parts])
         square = np.array([float(np.sum(left[p] ** 2)) for p in parts])
         whole = _Sums(normal, score, square, int(np.sum(found)))
         return whole.without(self.turns)
-
-
-def _inner(first: Array, second: Array) -> Array:
-    product: Array = first.reshape(-1, first.shape[2]).T @ second.reshape(-1, second.shape[2])
-    return product
 
 
 def _swept(view: Scene) -> Array:
