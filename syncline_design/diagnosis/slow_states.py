@@ -46,6 +46,7 @@ LEAST_ROWS = 8  # of a block
 HUBER = 1.345  # standard deviations from where on a component counts less
 REWEIGHTED = 3
 STEPS = 15  # of expectation and maximisation
+START = 0.1  # variance over the spec's from which sizes are looked for
 STEADY_SIZE = 1e-3  # relative step of a size below which it has settled
 LEAST = 1e-2  # of the spec's sigma: slow courses smaller than this do not matter
 MATTERS = 1e-3  # of a row's white standard deviation: channels below have no say
@@ -53,7 +54,7 @@ FLAT = 1e6  # prior variance of a constant while the sizes are found
 SCALE_LEAST = 0.02
 RIDGE = 1e-9  # of scaled columns that hold one another
 SIZES = 9  # variances of a channel that are weighed
-SWEEPS = 3
+SWEEPS = 3  # over all channels, each beside what the others are expected to be
 # Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
 KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
 KIN_SPREAD = 1.0  # standard deviation in log variance by which they differ
@@ -179,7 +180,7 @@ class States:
         """
         fixed = width + self.courses.shape[2]
         normal, score = total[:fixed, :fixed], total[:fixed, -1]
-        start, limit = np.full(len(self.roles), 0.1), self._limits(level)
+        start, limit = np.full(len(self.roles), START), self._limits(level)
         size2 = self._sized(normal, score, width, start, limit)
         size2 = self._expected(normal, score, width, size2, limit)
         return np.concatenate([np.zeros(width), np.maximum(self.wave, 1) / size2[self.channel]])
@@ -231,7 +232,7 @@ class States:
         if self.explained is not None:
             more = (root @ self.explained[:, axes]).reshape(len(part), -1)
         every = np.column_stack([part, error, more])
-        size2 = np.full(len(self.roles), 0.1)
+        size2 = np.full(len(self.roles), START)
         limit = self._limits(level)
         for _ in range(REWEIGHTED):
             total = every.T @ (weight[:, None] * every) / scale2

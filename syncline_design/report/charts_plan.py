@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_POINTS = 2000
-LEGEND_ROW = 18.0
+LEGEND_ROW = 18.0  # SVG units that a row of the legend takes
 FAR = 1e6  # times what is asked: not seen yet, and off the scale
 
 

@@ -46,7 +46,7 @@ from syncline_design.report.words import effect_words
 Row = tuple[Cell | str, ...]
 STANDS_MPS: Final = 0.01  # below which a vehicle is at rest
 MOST_TARGETS: Final = 12  # told outside the page
-MOST_COLUMNS: Final = 6
+MOST_COLUMNS: Final = 6  # of a table that fits a page
 
 
 def on_plan(run: PlanRun) -> Document:
