@@ -20,7 +20,7 @@ from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.diagnosis.unlike_readings import factor_effect
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration, rounded, to_digits
+from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
 from syncline_design.model.normal import NEARLY_ALL, NORMAL_95
 
 SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show
@@ -269,4 +269,6 @@ def _values(s: Stands | OtherFit) -> dict[str, float]:
 def _placed(s: Stands) -> str:
     """Between which stamps."""
     single = f"in {len(s.stamps_s)} single rows " if s.stamps_s else ""
+    if s.of_log is not None:
+        single = f"in {percent(s.of_log, 2)} of the rows, here and there, "
     return f"{single}from {to_digits(s.from_s, 6)} s to {to_digits(s.to_s, 6)} s"

@@ -23,7 +23,9 @@ from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.frozen import frozen
 from syncline_design.diagnosis.frozen_channels import frozen_channels
 from syncline_design.diagnosis.instead import InItsPlace, in_place
-from syncline_design.diagnosis.late_runs import Late, late_by_turns, late_runs
+from syncline_design.diagnosis.late_at_random import late_at_random
+from syncline_design.diagnosis.late_rows import Late
+from syncline_design.diagnosis.late_runs import late_by_turns, late_runs
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
 from syncline_design.diagnosis.looked_up import Mask
 from syncline_design.diagnosis.motion_columns import with_slopes
@@ -131,11 +133,13 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
 
 
 def _without_turns(inputs: Measured) -> tuple[list[tuple[Late, ...]], Measured]:
-    """Rows that are late by turns with the others, and the log without them: half of a log's rows
-    pass for noise and for waves of all sorts, which a search would take long to lay on each other.
+    """Rows that are late by turns with the others, or at random, and the log without them: half of
+    a log's rows pass for noise and for waves of all sorts, which a search would take long to lay on
+    each other.
     """
     view = scene(inputs.system, inputs.log, inputs.known)
-    found = late_by_turns(view, np.zeros(len(view), bool))
+    held = np.zeros(len(view), bool)
+    found = late_by_turns(view, held) or late_at_random(view, held)
     if not found:
         return [], inputs
     rows = np.isin(np.arange(len(view)), found[0].rows)
@@ -195,7 +199,7 @@ def _as_stands(inputs: Measured, data: Data, late: Sequence[tuple[Late, ...]]) -
             inside=is_inside(float(stamps_s[0]), float(stamps_s[-1]), inputs.log.ends_s),
             margin_s=0.0 if first.single else MARGIN_ROWS * inputs.log.interval_s, share=share,
             explained=1.0, ends=first.ends_s,
-            stamps_s=tuple(map(float, stamps_s)) if first.single else (),
+            stamps_s=tuple(map(float, stamps_s)) if first.single else (), of_log=first.of_log,
         )  # fmt: skip
 
 

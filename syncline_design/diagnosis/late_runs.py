@@ -20,9 +20,9 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.in_turn import in_turn, than_the_others
+from syncline_design.diagnosis.late_rows import Late, acting_late
 from syncline_design.diagnosis.looked_up import (
     LEAST_ROWS,
-    Index,
     LateRows,
     LookedUp,
     Mask,
@@ -30,10 +30,7 @@ from syncline_design.diagnosis.looked_up import (
 )
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.stretches import is_inside
-from syncline_design.effects import plain_delay
-from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import ActsOn, Array
-from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import chi_square_limit
 
 FAR: Final = 1e-9  # chance of a row's square, beyond which it is no noise
@@ -57,21 +54,6 @@ AS_GOOD_NATS: Final = 4.5  # within which another device fits as well
 BETTER_NATS: Final = 5.0  # by which a single row has to be late rather than sound
 WIDENED: Final = 3  # times that rows are added to those that are late
 _Told = tuple[Array, Array]  # delays and their spreads
-
-
-@dataclass(frozen=True, slots=True)
-class Late:
-    """A device that is late (or early) in some rows, by how much at most, and how far that puts
-    them off [m].  ends_s: of a delay that grows or falls, the first and last one.  single: whether
-    sound rows lie between."""
-
-    sensor: ActsOn
-    rows: Index
-    delay_s: float
-    spread_s: float
-    off_m: Array
-    ends_s: tuple[float, float] | None = None
-    single: bool = False
 
 
 def late_runs(view: Scene, held: Mask) -> list[tuple[Late, ...]]:
@@ -119,7 +101,9 @@ def _than_the_others(weighed: Weighed, held: Mask, one: Late) -> Late:
     if one.sensor != "ranging":
         return one
     rows = np.isin(np.arange(len(held)), one.rows)
-    more_s, spread_s = than_the_others(weighed.view, weighed.root, held, rows, _acting(one))
+    more_s, spread_s = than_the_others(
+        weighed.view, weighed.root, held, rows, acting_late(one.sensor, one.delay_s)
+    )
     return replace(one, delay_s=one.delay_s + more_s, spread_s=spread_s)
 
 
@@ -137,13 +121,8 @@ def _as_good(weighed: Weighed, fits: Sequence[Late]) -> Sequence[Late]:
 
 def _left_of_rows(weighed: Weighed, one: Late) -> float:
     """Squares of the rows that are late with their delay undone by their motion."""
-    error = np.nan_to_num(weighed.view.error((_acting(one),))[one.rows])
+    error = np.nan_to_num(weighed.view.error((acting_late(one.sensor, one.delay_s),))[one.rows])
     return float(np.sum(np.einsum("nij,nj->ni", weighed.root[one.rows], error) ** 2))
-
-
-def _acting(one: Late) -> Acting:
-    delay = plain_delay()
-    return Acting(delay, one.sensor, 0, {delay.parameters[0].name: one.delay_s})
 
 
 def _single(

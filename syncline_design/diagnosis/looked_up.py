@@ -44,7 +44,7 @@ class Weighed:
 
     root (n, 3, 3) of the inverse of every row's covariance, zero where nothing is compared; square
     (n,) of every row over its noise, of `freedom` components; beside (n, 3): what the spec's own
-    effects make of it [m].
+    effects make of it [m].  louder: the variance of that noise over the spec's.
     """
 
     view: Scene
@@ -52,6 +52,7 @@ class Weighed:
     square: Array
     freedom: Array
     beside: Array
+    louder: float
 
     @classmethod
     def of(cls, view: Scene, among: Mask | None = None) -> Weighed:
@@ -72,7 +73,7 @@ class Weighed:
         assert antenna_m is not None
         swung = rotate(euler_to_rotation(view.log.stages[0].euler_rad), vector_of(view))
         beside = error - np.nan_to_num(antenna_m + swung - view.log.truth_m)
-        return cls(view, root / math.sqrt(louder), square / louder, freedom, beside)
+        return cls(view, root / math.sqrt(louder), square / louder, freedom, beside, louder)
 
     @property
     def time_s(self) -> Array:

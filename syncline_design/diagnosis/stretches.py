@@ -77,7 +77,8 @@ class Stands:
     frozen: whether it is one reading that is given over and over, of which the value is the age;
     reading: which of the sensor's, where its others go on.
     ends: of one that grows or falls, what it is at either end; the value is the larger.
-    stamps_s: of single rows with sound ones between, those that it acts in.
+    stamps_s: of single rows with sound ones between, those that it acts in; of_log: their share of
+    the log, where rows that no one can tell count in part.
     """
 
     label: Label
@@ -98,6 +99,7 @@ class Stands:
     explained: float = 0.0
     ends: tuple[float, float] | None = None
     stamps_s: tuple[float, ...] = ()
+    of_log: float | None = None
     reading: str = ""
 
     @property
