@@ -60,3 +60,39 @@ def test_noise_of_all_readings_is_no_delay(tmp_path: Path) -> None:
     for what in ((louder,), ()):
         assert not [key for key in seen(*files(tmp_path, world(*RUN), what)).sways
                     if key.endswith("/position")]  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", ["normal", "of three values", "exponential"])
+def test_stamps_that_scatter_are_bound_by_the_worst_row(shape: str, tmp_path: Path) -> None:
+    """Their standard deviation stood there as the bound of a row; and a mean as the delay."""
+    rng = np.random.default_rng(3)
+    sound = make_log(world(*RUN))
+    columns = dict(sound.columns)
+    count = len(columns["time_s"])
+    late_s = {
+        "normal": rng.normal(0.0, 0.02, count),
+        "of three values": rng.choice([0.0, 0.03, 0.06], count),
+        "exponential": rng.exponential(0.02, count),
+    }[shape]
+    for axis in AXES:
+        moved = late_s * columns[f"velocity_{axis}_mps"]
+        columns[f"position_{axis}_m"] = columns[f"position_{axis}_m"] - moved
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(sound.spec_yaml(), "utf-8")
+    log = write_columns(tmp_path / "log.csv", columns)
+    told = accept(load(spec), [log], AcceptSettings(("latency", "timing")), seed=0)
+    rows = {(row.role, row.assumption): row for row in told.assumptions}
+    row = rows["position", "timing"]
+    assert row.status == "broken"
+    assert row.measured is not None
+    assert row.measured.low is not None
+    assert row.measured.high is not None
+    largest_s = float(np.max(np.abs(late_s - np.mean(late_s))))
+    assert row.measured.low <= largest_s <= row.measured.high <= 1.5 * largest_s
+    assert "standard deviation" in row.evidence
+    assert "in the worst row" in row.evidence
+    delay = rows["position", "latency"].measured
+    if rows["position", "latency"].status == "broken":
+        assert delay is not None
+        assert delay.high is not None
+        assert delay.high >= float(np.max(late_s))

@@ -87,7 +87,7 @@ def test_a_refclock_that_steers_nothing_is_the_evidence(tmp_path: Path) -> None:
         for i in range(200):
             time_s = START + 86400.0 * k + 16.0 * i
             tracking.append(made.tracking_line(time_s, 1e-7))
-            pulses += made.refclock_lines(time_s, 2e-5)
+            pulses += made.refclock_lines(time_s, 2e-5 + 1e-9 * (i % 2))
     logs = [write(tmp_path / "tracking.log", tracking), write(tmp_path / "refclocks.log", pulses)]
     timing = study_logs(logs, TimingSettings()).timing
     assert timing.source.name == "chrony refclock PPS2"
@@ -207,7 +207,9 @@ def test_logs_in_doubt_carry_no_claim_and_nothing_is_written(name: str, tmp_path
     found = json.loads(done.stdout)
     assert any(DOUBTS[name] in one for one in found["doubts"]), found["doubts"]
     assert found["claim"]["made"] is False
-    assert found["statistical_bound_s"] is None
+    bounds = ("bound_s", "event_bound_s", "statistical_bound_s", "hard_bound_s")
+    assert [found[bound] for bound in bounds] == [None] * 4
+    assert found["claim"]["why_not"] == "the logs are in doubt"
     assert found["entry"] is None
     assert not entry.exists()
     assert study_logs(_spoiled(tmp_path, "nothing"), TimingSettings()).timing.doubts == ()

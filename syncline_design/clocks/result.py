@@ -145,7 +145,8 @@ class Timing(Record):
     statistical_bound_s None: too few sessions for one, sessions that are not alike, or logs in
     doubt; hard_bound_s None: the logs hold no dispersions or delays.  bound_s: the larger of both
     (`use` says otherwise where the user did), declared terms included; event_bound_s: with slow
-    starts, lost lock, steps and holdover.  doubts: what forbids any claim until it is explained.
+    starts, lost lock, steps and holdover.  doubts: what forbids any claim until it is explained;
+    with them there is no bound of any kind.
     reservations: what keeps these logs from bearing a bound out for later sessions or for the
     whole way, though a claim may be made.
     """

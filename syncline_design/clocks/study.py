@@ -104,6 +104,7 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     course = SessionCourse() if doubted else SessionCourse.of(counted, quantiles, settings.coverage)
     claimable = not doubted and course.forbids is None
     figures = _figures(counted, sessions, settings, course.effective, claimable=claimable)
+    figures = figures.in_doubt() if doubted else figures
     claim = _claim(counted, chosen, settings, figures, (doubted, course))
     reserved = (*chosen.reservations, *reservations(sessions))
     results = tuple(_session(s, settings.coverage) for s in sessions)
@@ -149,13 +150,17 @@ class _Figures:
     event_s: float | None
     method: str | None
 
+    def in_doubt(self) -> _Figures:
+        """Of logs of which something has to be explained first: no bound of any kind."""
+        return _Figures(self.quantiles, None, None, None, None, None)
+
 
 def _figures(
     counted: Sequence[ClockSession], sessions: Sequence[ClockSession], settings: TimingSettings,
     effective: float, *, claimable: bool,
 ) -> _Figures:  # fmt: skip
     """The bounds.  With too few sessions for a statistical one, that of these sessions alone; so of
-    logs in doubt, or sessions that are not alike, of which nothing can be claimed."""
+    sessions that are not alike, of which nothing can be claimed."""
     quantiles = np.array([s.quantile_s(settings.coverage) for s in counted])
     if not counted:
         return _Figures(quantiles, None, None, None, None, None)

@@ -20,6 +20,7 @@ from syncline_design.comparison.by_noise import (
     swaying_words,
     sways,
 )
+from syncline_design.comparison.by_scatter import as_bound, with_scatter
 from syncline_design.comparison.by_shift import by_shifts, shifts, widened
 from syncline_design.comparison.by_stretch import SPOKEN_OF
 from syncline_design.comparison.departing import amount, figure_of
@@ -73,10 +74,11 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
             of_what(breaking, log.split(one)),
         )
         undone = list(log.parts.undone(one, _width(said.measured)))
+        said = as_bound(one, said, breaking, log)
         if one.name == "noise":  # how far it scatters is not what constants and drifts hide
             return replace(said, words=_with_more(said, undone))
         said = _but_for(said, undone, log.parts.room_undone(one), _is_signed(one))
-        said = _in_all(one, said, log) or said
+        said = with_scatter(one, _in_all(one, said, log) or said, log)
         return beside_shapes(one, _or_more(one, said, log), log, signed=_is_signed(one))
     moved = [each for each in shifts(one, log.found) if log.is_sure(one, each.finding)]
     shifted = by_shifts(one, moved, log.paper)

@@ -46,7 +46,7 @@ from syncline_design.diagnosis.stretches import (
     left_as_one,
     stretches,
 )
-from syncline_design.diagnosis.swaying import swaying
+from syncline_design.diagnosis.swaying import LargestDelay, largest_delays, swaying
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
 from syncline_design.effects import plain_delay, registry
@@ -73,6 +73,7 @@ class Sighted:
     ends_s: stamps of the log's first and last row; None: not known.  course: what is left, where
     that is one course that begins and ends.  left_out: share of the rows that it is without.
     stated_m: RMS that the spec's noise of every sensor makes, by `stage/sensor`.
+    largest: of sensors whose stamps scatter, the largest delay of a row, by `stage/sensor`.
     """
 
     found: Diagnosis
@@ -87,6 +88,7 @@ class Sighted:
     left_out: float = 0.0
     sways: Mapping[str, float] = field(default_factory=dict)
     stated_m: Mapping[str, float] = field(default_factory=dict)
+    largest: Mapping[str, LargestDelay] = field(default_factory=dict)
 
     @property
     def left_in(self) -> tuple[Stands, ...]:
@@ -129,6 +131,7 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             1.0 - len(one.inputs.log) / len(inputs.log),
             swaying(one.data, model, one.search.signatures, one.search.unlike or ()),
             stated_m(one.data),
+            largest_delays(one.data, model),
         )
 
 
