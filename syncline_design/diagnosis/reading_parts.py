@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ReadingPart:
     """Readings of a device by their place in its row, and their name; of all of them none."""
 
     sensor: ActsOn
@@ -40,14 +40,14 @@ class Part:
 
 
 PARTS: Final = (
-    Part("attitude", (2,), "yaw"),
-    Part("attitude", (0, 1), "roll and pitch"),
-    Part("attitude", (0,), "roll"),
-    Part("attitude", (1,), "pitch"),
-    Part("position", (2,), "height"),
-    Part("position", (0, 1), "north and east"),
+    ReadingPart("attitude", (2,), "yaw"),
+    ReadingPart("attitude", (0, 1), "roll and pitch"),
+    ReadingPart("attitude", (0,), "roll"),
+    ReadingPart("attitude", (1,), "pitch"),
+    ReadingPart("position", (2,), "height"),
+    ReadingPart("position", (0, 1), "north and east"),
 )
-WHOLES: Final = (Part("attitude", (0, 1, 2)), Part("position", (0, 1, 2)))
+WHOLES: Final = (ReadingPart("attitude", (0, 1, 2)), ReadingPart("position", (0, 1, 2)))
 
 
 def readings_late(view: Scene) -> Array:
@@ -71,7 +71,7 @@ def _swept(view: Scene) -> Array:
     return np.stack(columns, axis=2)
 
 
-def put_back(log: Log, part: Part, delay_s: float) -> tuple[Log, Mask]:
+def put_back(log: Log, part: ReadingPart, delay_s: float) -> tuple[Log, Mask]:
     """The log with readings as they were at its stamps, and the rows of which these are known."""
     from scipy.interpolate import CubicSpline
 

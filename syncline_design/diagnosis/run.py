@@ -26,7 +26,7 @@ from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
-from syncline_design.diagnosis.late_angle import is_far_off, late_angles
+from syncline_design.diagnosis.late_part import is_far_off, late_part
 from syncline_design.diagnosis.motion_columns import (
     columns_of,
     contradictions,
@@ -152,12 +152,12 @@ def examined(
     )
     few, exclude = _in_windows(log), settings.exclude_effects
     early = is_far_off(inputs, few)  # where all of a search would be for nothing
-    late = late_angles(inputs, log, few, exclude) if early else None
+    late = late_part(inputs, log, few, exclude) if early else None
     if late is None:
         one = _settled(inputs, faults, log, settings, progress)
         if early or not one.found_any:
             return one
-        late = late_angles(inputs, log, few, exclude)
+        late = late_part(inputs, log, few, exclude)
         if late is None:
             return one
     return _settled(inputs, (*faults, late.fault), late.log, settings, progress)

@@ -1,4 +1,4 @@
-"""`accept` on an attitude of which some angles are late and the others keep their time.
+"""`accept` on a device of which some readings are late and the others keep their time.
 
 The logs are of the tests' own world: the columns of some angles are those of a second log of the
 same run in which the whole attitude is late.
@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.diagnosis.late_angle import LateAngles, late_angles, put_back
+from syncline_design.diagnosis.late_part import LatePart, late_part
+from syncline_design.diagnosis.reading_parts import ReadingPart, put_back
 from syncline_design.diagnosis.run import diagnose
 from syncline_design.diagnosis.system import measured
 from syncline_design.spec.load import load
@@ -25,20 +26,25 @@ CIRCLES = ("fixed_wing_circuits", 2, 80.0, 8.0)
 
 
 def late_columns(
-    folder: Path, run: Scenario, names: tuple[str, ...], delay_s: float, noise: Noise | None = None
+    folder: Path,
+    run: Scenario,
+    names: tuple[str, ...],
+    delay_s: float,
+    noise: Noise | None = None,
+    device: str = "attitude",
 ) -> tuple[Path, Path]:
-    """Spec and log of which some columns are those of an attitude that is late."""
+    """Spec and log of which some columns are those of a device that is late."""
     sound = make_log(run, (), noise)
-    late = make_log(run, (hidden("latency", "attitude", latency_s=delay_s),), noise)
+    late = make_log(run, (hidden("latency", device, latency_s=delay_s),), noise)
     columns = dict(sound.columns) | {name: late.columns[name] for name in names}
     spec = folder / "spec.yaml"
     spec.write_text(sound.spec_yaml(), "utf-8")
     return spec, write_columns(folder / "log.csv", columns)
 
 
-def told(spec: Path, log: Path) -> LateAngles | None:
+def told(spec: Path, log: Path) -> LatePart | None:
     inputs = measured(load(spec), [log])
-    return late_angles(inputs, inputs.log, inputs.log)
+    return late_part(inputs, inputs.log, inputs.log)
 
 
 @pytest.mark.parametrize("delay_s", [0.1, 0.4, -0.05])
@@ -62,6 +68,23 @@ def test_a_level_that_is_late_alone_is_no_early_heading(tmp_path: Path) -> None:
     assert found.fault.acting.values["latency_s"] == pytest.approx(0.1, abs=0.01)
 
 
+@pytest.mark.parametrize("delay_s", [0.15, -0.1])
+@pytest.mark.parametrize(
+    ("axes", "name"), [(("down",), "height"), (("north", "east"), "north and east")]
+)
+def test_places_of_which_some_are_late_alone_are_told(
+    axes: tuple[str, ...], name: str, delay_s: float, tmp_path: Path
+) -> None:
+    columns = tuple(f"position_{axis}_m" for axis in axes)
+    found = told(*late_columns(tmp_path, world(*TURNS), columns, delay_s, None, "position"))
+    assert found is not None
+    assert found.fault.readings == name
+    assert found.fault.acting.sensor == "position"
+    assert found.fault.spread is not None
+    value = found.fault.acting.values["latency_s"]
+    assert abs(value - delay_s) < 3.0 * found.fault.spread < 0.03
+
+
 @pytest.mark.parametrize(
     "what",
     [
@@ -69,6 +92,8 @@ def test_a_level_that_is_late_alone_is_no_early_heading(tmp_path: Path) -> None:
         (hidden("latency", "attitude", latency_s=0.1),),
         (hidden("latency", "position", latency_s=0.1),),
         (hidden("mounting", "attitude", x_rad=0.0, y_rad=0.02, z_rad=0.05),),
+        (hidden("lever_arm", "position", x_m=0.3, y_m=0.0, z_m=0.2),),
+        (hidden("noise_understated", "position", factor=3.0),),
         (hidden("heading_drift", "attitude", rate_radps=1e-4),),
     ],
 )
@@ -129,7 +154,7 @@ def test_angles_are_put_back_across_half_a_turn(tmp_path: Path) -> None:
     spec, path = late_columns(tmp_path, world(*CIRCLES), (), 0.25)
     kept = measured(load(spec), [path]).log
     late = late_columns(tmp_path, world(*CIRCLES), ("yaw_deg",), 0.25)[1]
-    back, known = put_back(measured(load(spec), [late]).log, (2,), 0.25)
+    back, known = put_back(measured(load(spec), [late]).log, ReadingPart("attitude", (2,)), 0.25)
     off = back.stages[0].euler_rad[known, 2] - kept.stages[0].euler_rad[known, 2]
     off = np.angle(np.exp(1j * off))
     assert np.sum(~known) <= 3

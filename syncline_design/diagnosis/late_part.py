@@ -1,14 +1,16 @@
-"""Angles of an attitude of which some are late and the others are not: a heading of two antennas.
+"""Readings of a device of which some are late and the others are not: a heading of two antennas
+beside an inertial level, a height of another receiver or a barometer.
 
-The attitude's delay turns all of its angles at once.  Where the heading alone is late by L,
+A device's delay moves all of its readings at once.  Where the heading alone is late by L,
     yaw(t + L) = what it was at t,
 is in the log, so that the column is put back by looking it up, and what is left is asked for
 everything else.  With e the error, X what a build can be wrong by (delays of whole sensors, arms,
-turns, a range's bias) and Z = -d angle/dt de/d angle of some angles,
+turns, a range's bias) and Z = -d reading/dt de/d reading of some readings,
     e = X b + Z L + w,
-Gauss-Newton with the column looked up anew each time.  It is those angles where the whole attitude
-leaves clearly more, over all of the log (leaving out one of sixteen stretches after the other), and
-a filter of the attitude, which delays quick angles less than slow ones, leaves more as well.
+Gauss-Newton with the columns looked up anew each time.  It is those readings where the whole device
+and those of another leave clearly more, over all of the log (leaving out one of sixteen stretches
+after the other), and a filter of the device, which delays quick motion less than slow one, leaves
+more as well.
 """
 
 from __future__ import annotations
@@ -19,23 +21,28 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from syncline_design.diagnosis.candidates import candidates, plain_signatures
 from syncline_design.diagnosis.fitting import inner
 from syncline_design.diagnosis.frozen_channels import euler_rates
 from syncline_design.diagnosis.gross import Gross, expected_size, usual_size
 from syncline_design.diagnosis.judged import log_f
-from syncline_design.diagnosis.looked_up import Weighed, vector_of
+from syncline_design.diagnosis.looked_up import Weighed
+from syncline_design.diagnosis.reading_parts import (
+    PARTS,
+    WHOLES,
+    Mask,
+    ReadingPart,
+    put_back,
+    readings_late,
+)
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.system import Measured
 from syncline_design.diagnosis.undone import BUILD
 from syncline_design.effects import plain_delay
 from syncline_design.effects.acting import Acting
-from syncline_design.effects.kinematics import euler_to_rotation, rotate
-from syncline_design.effects.record import Array
-from syncline_design.logs.log import GAP_FACTOR, Log
-from syncline_design.logs.stamps import per_stamp, usual_step_s
+from syncline_design.effects.record import ActsOn, Array
+from syncline_design.logs.log import Log
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import student_limit
 from syncline_design.model.normal import NORMAL_95
@@ -44,22 +51,17 @@ from syncline_design.model.system import System
 FAR: Final = 1.5  # times the usual error of the spec's noise
 BLOCKS: Final = 16
 LEAST_ROWS: Final = 200
-ANGLES: Final = {(2,): "yaw", (0, 1): "roll and pitch", (0,): "roll", (1,): "pitch"}
-WHOLE: Final = (0, 1, 2)
 ALL_FREE: Final = ("position", "attitude", "ranging")
-CHANCE: Final = 1e-6  # that angles of one delay differ so much, over all groups
-CLEARLY_NATS: Final = 15.0  # by which some angles have to be likelier than all, in any 15 of 16
+CHANCE: Final = 1e-6  # that readings of one delay differ so much, over all parts
+CLEARLY_NATS: Final = 15.0  # by which some readings have to be likelier than all, in any 15 of 16
 LEAST_S, MOST_S = 2e-3, 2.0  # of a delay
 STEPS: Final = 8
-STEP_RAD: Final = 1e-5
 MEMORIES_S: Final = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
-Mask = NDArray[np.bool_]
-Group = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class LateAngles:
-    """Angles that are late by themselves, and the log with them put back."""
+class LatePart:
+    """Readings that are late by themselves, and the log with them put back."""
 
     fault: Gross
     log: Log
@@ -71,40 +73,21 @@ def is_far_off(inputs: Measured, few: Log) -> bool:
     return usual_size(view.error()) > FAR * expected_size(view)
 
 
-def late_angles(
-    inputs: Measured, log: Log, few: Log, exclude: Sequence[str] = ()
-) -> LateAngles | None:
-    """Angles of the attitude of a log of one vehicle that are late alone; few: the rows that are
+def late_part(inputs: Measured, log: Log, few: Log, exclude: Sequence[str] = ()) -> LatePart | None:
+    """Readings of a device of a log of one vehicle that are late alone; few: the rows that are
     worked on, of a long log some."""
     looking = _Looking.of(inputs.system, few, inputs.known, exclude)
     told = None if looking is None else looking.clearest()
     if looking is None or told is None:
         return None
-    group, delay_s, spread_s = told
+    part, delay_s, spread_s = told
     delay = plain_delay()
-    acting = Acting(delay, "attitude", 0, {delay.parameters[0].name: delay_s})
-    back, known_rows = put_back(log, group, delay_s)
-    after = looking.left(group, delay_s)
+    acting = Acting(delay, part.sensor, 0, {delay.parameters[0].name: delay_s})
+    back, known_rows = put_back(log, part, delay_s)
+    after = looking.left(part, delay_s)
     falls_by = usual_size(looking.view.error()) / max(usual_size(after), 1e-300)
-    fault = Gross(acting, falls_by, spread_s, ANGLES[group])
-    return LateAngles(fault, back.rows(known_rows))
-
-
-def put_back(log: Log, group: Group, delay_s: float) -> tuple[Log, Mask]:
-    """The log with some angles as they were at its stamps, and the rows of which that is known."""
-    from scipy.interpolate import CubicSpline
-
-    first = log.stages[0]
-    times, angles = per_stamp(log.time_s, first.euler_rad)
-    wanted = log.time_s + delay_s
-    right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    near = times[right] - times[right - 1] <= GAP_FACTOR * usual_step_s(log.time_s)
-    found = near & (wanted >= times[0]) & (wanted <= times[-1])
-    courses = CubicSpline(times, np.unwrap(angles, axis=0))(wanted)
-    euler = first.euler_rad.copy()
-    for k in group:
-        euler[found, k] = courses[found, k]
-    return replace(log, stages=(replace(first, euler_rad=euler), *log.stages[1:])), found
+    fault = Gross(acting, falls_by, spread_s, part.name)
+    return LatePart(fault, back.rows(known_rows))
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,9 +137,9 @@ class _Sums:
 class _Looking:
     """A log, what else it may be off by (n, 3, P) in units of a build, and what angles do.
 
-    swept (n, 3, 3): slopes of the error by roll, pitch and yaw times their rates.
+    swept (n, 3, 6): what a second of delay of every reading does (`readings_late`).
     whose: of each column of X the sensor that it delays; "" of one that is no delay.
-    turns: the columns of X that turn the attitude.
+    slow: the columns of X that slow noise makes: turns of the attitude, and places that are off.
     """
 
     system: System
@@ -165,7 +148,7 @@ class _Looking:
     columns: Array
     swept: Array
     whose: tuple[str, ...]
-    turns: tuple[int, ...]
+    slow: tuple[int, ...]
 
     @classmethod
     def of(
@@ -188,52 +171,55 @@ class _Looking:
                   for s in asked for _ in s.candidate.effect.slopes()]  # fmt: skip
         if "attitude" not in whose:
             return None
-        columns = np.concatenate(
-            [s.columns * [BUILD[p.unit] for p in s.candidate.effect.slopes()] for s in asked],
-            axis=2,
-        )
-        return cls(system, view, Weighed.of(view), columns, _swept(view), whose,
-                   tuple(np.flatnonzero(turned)))  # fmt: skip
+        built = [s.columns * [BUILD[p.unit] for p in s.candidate.effect.slopes()] for s in asked]
+        off = np.broadcast_to(BUILD["m"] * np.eye(3), (len(view), 3, 3))
+        slow = (*np.flatnonzero(turned), *range(len(whose), len(whose) + 3))
+        return cls(
+            system, view, Weighed.of(view), np.concatenate([*built, off], axis=2),
+            readings_late(view), (*whose, "", "", ""), tuple(map(int, slow)),
+        )  # fmt: skip
 
-    def left(self, group: Group, delay_s: float) -> Array:
+    def left(self, part: ReadingPart, delay_s: float) -> Array:
         """The error (n, 3) with some angles put back; as it was where that is not known."""
-        return self._put_back(group, delay_s)[0]
+        return self._put_back(part, delay_s)[0]
 
-    def _put_back(self, group: Group, delay_s: float) -> tuple[Array, Mask]:
-        log, found = put_back(self.view.log, group, delay_s)
+    def _put_back(self, part: ReadingPart, delay_s: float) -> tuple[Array, Mask]:
+        log, found = put_back(self.view.log, part, delay_s)
         return scene(self.system, log, self.view.known).error(), found
 
-    def clearest(self) -> tuple[Group, float, float] | None:
+    def clearest(self) -> tuple[ReadingPart, float, float] | None:
         """The angles that are late alone, by how much, and its standard uncertainty."""
         start = self._sums(self.view.error(), np.ones(len(self.view), bool))
-        if not any(self._differs(start, group) for group in ((2,), (0,), (1,))):
+        single = [part for part in PARTS if len(part.readings) == 1]
+        if not any(self._differs(start, part) for part in single):
             return None
-        fits = [(group, self._fitted(group)) for group in (*ANGLES, WHOLE)]
-        found = [(group, delay) for group, delay in fits if delay is not None]
+        fits = [(part, self._fitted(part)) for part in (*PARTS, *WHOLES)]
+        found = [(part, delay) for part, delay in fits if delay is not None]
         if not found:
             return None
         best, delay_s = min(found, key=lambda one: self._square(*one))
-        if best == WHOLE or not LEAST_S <= abs(delay_s) <= MOST_S:
+        if best in WHOLES or not LEAST_S <= abs(delay_s) <= MOST_S:
             return None
-        if not self._is_clear(best, delay_s, [d for g, d in found if g == WHOLE]):
+        others = [one for one in found if one[0] in WHOLES or one[0].sensor != best.sensor]
+        if not self._is_clear(best, delay_s, others):
             return None
         return self._judged(best, delay_s)
 
-    def _differs(self, sums: _Sums, group: Group) -> bool:
+    def _differs(self, sums: _Sums, part: ReadingPart) -> bool:
         """Whether angles are late by something else than the whole attitude is, by the
         variance of leaving out one stretch after the other."""
-        value, spread = self._of_group(sums, group, ALL_FREE)
+        value, spread = self._of_group(sums, part, ALL_FREE)
         share = (value / max(spread, 1e-300)) ** 2
-        return log_f(share, 1, BLOCKS - 1) < math.log(CHANCE / len(ANGLES))
+        return log_f(share, 1, BLOCKS - 1) < math.log(CHANCE / len(PARTS))
 
-    def _fitted(self, group: Group) -> float | None:
+    def _fitted(self, part: ReadingPart) -> float | None:
         """The delay of some angles that leaves least, without one of the whole attitude."""
         delay_s = 0.0
         for _ in range(STEPS):
-            error, found = self._put_back(group, delay_s)
+            error, found = self._put_back(part, delay_s)
             if np.mean(found) < 0.5:
                 return None
-            value, spread = self._of_group(self._sums(error, found), group)
+            value, spread = self._of_group(self._sums(error, found), part)
             delay_s += value
             if not abs(delay_s) <= MOST_S:
                 return None
@@ -241,43 +227,47 @@ class _Looking:
                 break
         return delay_s
 
-    def _judged(self, group: Group, delay_s: float) -> tuple[Group, float, float]:
-        error, found = self._put_back(group, delay_s)
-        value, spread = self._of_group(self._sums(error, found), group)
+    def _judged(self, part: ReadingPart, delay_s: float) -> tuple[ReadingPart, float, float]:
+        error, found = self._put_back(part, delay_s)
+        value, spread = self._of_group(self._sums(error, found), part)
         reach = student_limit(0.025, BLOCKS - 1) / NORMAL_95
-        return group, delay_s + value, reach * spread
+        return part, delay_s + value, reach * spread
 
     def _kept(self, late: Sequence[str]) -> list[int]:
         """Columns that are no delays, and the delays of some sensors."""
         return [k for k, sensor in enumerate(self.whose) if not sensor or sensor in late]
 
-    def _of_group(self, sums: _Sums, group: Group, late: Sequence[str] = ()) -> tuple[float, float]:
+    def _of_group(
+        self, sums: _Sums, part: ReadingPart, late: Sequence[str] = ()
+    ) -> tuple[float, float]:
         """The delay [s] of some angles beside all else, and its standard uncertainty.
 
         late: whole sensors that may be as well.
         """
         width, kept = self.columns.shape[2], self._kept(late)
-        together = np.zeros((width + 3, len(kept) + 1))
+        together = np.zeros((width + self.swept.shape[2], len(kept) + 1))
         together[kept, range(len(kept))] = 1.0
-        together[[width + k for k in group], -1] = 1.0
+        together[[width + k for k in part.columns], -1] = 1.0
         own = _Sums(
             together.T @ sums.normal @ together, sums.score @ together, sums.square, sums.rows
         )
         values, normal = own.solved(range(len(kept) + 1))
         less = values[1:, -1]
-        spread2 = (BLOCKS - 1) / BLOCKS * float(np.sum((less - np.mean(less)) ** 2))
+        apart = less - np.mean(less)
+        pairs = apart[0::2] + apart[1::2]  # noise goes on from one stretch to the next
+        spread2 = (BLOCKS - 1) / BLOCKS * float(max(np.sum(apart**2), np.sum(pairs**2)))
         left = float(np.sum(own.left(range(len(kept) + 1))))
         noise2 = left / max(sums.rows * float(np.mean(self.weighed.freedom)), 1.0)
         at_best = noise2 * float(np.linalg.inv(normal + np.eye(len(normal)))[-1, -1])
         unit = BUILD["s"]
         return unit * float(values[0, -1]), unit * math.sqrt(max(spread2, at_best))
 
-    def _square(self, group: Group, delay_s: float) -> float:
-        return float(np.sum(self._blocks(group, delay_s)))
+    def _square(self, part: ReadingPart, delay_s: float) -> float:
+        return float(np.sum(self._blocks(part, delay_s)))
 
-    def _blocks(self, group: Group, delay_s: float) -> Array:
+    def _blocks(self, part: ReadingPart, delay_s: float) -> Array:
         """What is left of every stretch, a row, with all else free (BLOCKS,)."""
-        error, found = self._put_back(group, delay_s)
+        error, found = self._put_back(part, delay_s)
         return self._left_of(error, found)
 
     def _left_of(self, error: Array, found: Mask) -> Array:
@@ -285,29 +275,37 @@ class _Looking:
         left: Array = sums.left(self._kept(())) / max(sums.rows, 1)
         return left
 
-    def _is_clear(self, group: Group, delay_s: float, of_whole: Sequence[float]) -> bool:
-        """Whether all angles together, and every filter of them, leave clearly more."""
-        own = self._blocks(group, delay_s)
-        rivals = [self._blocks(WHOLE, each) for each in of_whole]
+    def _is_clear(
+        self, part: ReadingPart, delay_s: float, others: Sequence[tuple[ReadingPart, float]]
+    ) -> bool:
+        """Whether other readings, and every filter of the device, leave clearly more."""
+        own = self._blocks(part, delay_s)
+        rivals = [self._blocks(*each) for each in others]
         every = np.ones(len(self.view), bool)
-        rivals += [self._left_of(error, every) for error in self._unfiltered()]
+        rivals += [self._left_of(error, every) for error in self._unfiltered(part.sensor)]
         rows = len(self.view)
         noise2 = float(np.sum(own)) / np.mean(self.weighed.freedom)  # as loud as what is left
         gained = [0.5 * rows * (each - own) / noise2 for each in rivals]
         return all(np.sum(nats) - np.max(nats) > CLEARLY_NATS for nats in gained)
 
-    def _unfiltered(self) -> Iterator[Array]:
-        """Errors of the log with what a low pass of its angles leaves behind put back."""
+    def _unfiltered(self, sensor: ActsOn) -> Iterator[Array]:
+        """Errors of the log with what a low pass of a device leaves behind put back."""
         log = self.view.log
         first = log.stages[0]
         for memory_s in MEMORIES_S:
-            behind = _behind(log.time_s, euler_rates(first), memory_s)
-            own = replace(first, euler_rad=first.euler_rad + behind)
+            if sensor == "attitude":
+                behind = _behind(log.time_s, euler_rates(first), memory_s)
+                own = replace(first, euler_rad=first.euler_rad + behind)
+            else:
+                assert first.antenna_m is not None
+                moving = -np.einsum("nkk->nk", self.swept[:, :, 3:])
+                behind = _behind(log.time_s, moving, memory_s)
+                own = replace(first, antenna_m=first.antenna_m + behind)
             back = replace(log, stages=(own, *log.stages[1:]))
             yield scene(self.system, back, self.view.known).error()
 
     def _sums(self, error: Array, found: Mask) -> _Sums:
-        """Whitened, of X and the three angles beside one another."""
+        """Whitened, of X and the delays of every reading beside one another."""
         root = self.weighed.root * found[:, None, None]
         every = np.concatenate([self.columns, BUILD["s"] * self.swept], axis=2)
         columns = root @ np.nan_to_num(every)
@@ -317,19 +315,7 @@ class _Looking:
         score = np.array([np.einsum("nik,ni->k", columns[p], left[p]) for p in parts])
         square = np.array([float(np.sum(left[p] ** 2)) for p in parts])
         whole = _Sums(normal, score, square, int(np.sum(found)))
-        return whole.without(self.turns)
-
-
-def _swept(view: Scene) -> Array:
-    """What a second of delay of roll, pitch and yaw does to the error (n, 3, 3) [m/s]."""
-    logged = view.log.stages[0]
-    vector, plain = vector_of(view), euler_to_rotation(logged.euler_rad)
-    rates = euler_rates(logged)
-    columns = []
-    for k in range(3):
-        moved = euler_to_rotation(logged.euler_rad + STEP_RAD * np.eye(3)[k])
-        columns.append(-rates[:, [k]] * rotate(moved - plain, vector) / STEP_RAD)
-    return np.stack(columns, axis=2)
+        return whole.without(self.slow)
 
 
 def _behind(time_s: Array, rates: Array, memory_s: float) -> Array:
