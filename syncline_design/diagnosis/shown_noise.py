@@ -18,7 +18,8 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Signature
 from syncline_design.diagnosis.fitting import Data, data_of
 from syncline_design.diagnosis.noise import Slow, as_specified
-from syncline_design.diagnosis.slow_states import Channel, slow_states
+from syncline_design.diagnosis.slow_sizes import Channel
+from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.survey import with_shown_survey
 
 COURSES = 1.0  # variance of the mean over that of the first course

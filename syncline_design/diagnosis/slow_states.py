@@ -20,15 +20,14 @@ from dataclasses import field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve
 
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled
 from syncline_design.diagnosis.judged import Course, Judged, course_of
 from syncline_design.diagnosis.noise import NoiseLevel, SensorKey, white_covariance
-from syncline_design.diagnosis.positive import inverse as inverse_of
 from syncline_design.diagnosis.recent import LastMade
+from syncline_design.diagnosis.slow_sizes import Channel, Sizing
 from syncline_design.diagnosis.slow_sums import LOST, HeldFixed, Weighted
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
@@ -36,7 +35,6 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 
-Channel = tuple[SensorKey, int]
 SURVEY: SensorKey = ("", "target")  # channel of the targets' survey errors
 WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
@@ -45,19 +43,8 @@ FEW = 8, 64  # targets, to be left out one group after the other
 LEAST_ROWS = 8  # of a block
 HUBER = 1.345  # standard deviations from where on a component counts less
 REWEIGHTED = 3
-STEPS = 15  # of expectation and maximisation
-START = 0.1  # variance over the spec's from which sizes are looked for
-STEADY_SIZE = 1e-3  # relative step of a size below which it has settled
-LEAST = 1e-2  # of the spec's sigma: slow courses smaller than this do not matter
 MATTERS = 1e-3  # of a row's white standard deviation: channels below have no say
-FLAT = 1e6  # prior variance of a constant while the sizes are found
 SCALE_LEAST = 0.02
-RIDGE = 1e-9  # of scaled columns that hold one another
-SIZES = 9  # variances of a channel that are weighed
-SWEEPS = 3  # over all channels, each beside what the others are expected to be
-# Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
-KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
-KIN_SPREAD = 1.0  # standard deviation in log variance by which they differ
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,41 +167,10 @@ class States:
         """
         fixed = width + self.courses.shape[2]
         normal, score = total[:fixed, :fixed], total[:fixed, -1]
-        start, limit = np.full(len(self.roles), START), self._limits(level)
-        size2 = self._sized(normal, score, width, start, limit)
-        size2 = self._expected(normal, score, width, size2, limit)
+        sizing = self._sizing(level)
+        size2 = sizing.likeliest(normal, score, width, sizing.start)
+        size2 = sizing.expected(normal, score, width, size2)
         return np.concatenate([np.zeros(width), np.maximum(self.wave, 1) / size2[self.channel]])
-
-    def _expected(
-        self, normal: Array, score: Array, width: int, size2: Array, limit: Array
-    ) -> Array:
-        """Mean of each channel's variance by what the log says of it, the others as they are.
-
-        The likeliest is near 0 where a log is too short to show slow noise, and the variance of
-        what a bias is known to grows with this variance: so its mean counts, over all from LEAST^2
-        to the limit, alike likely by their logarithm.
-        """
-        found = size2.copy()
-        for c in np.tile(np.arange(len(found)), SWEEPS):
-            sizes = np.geomspace(LEAST**2, limit[c], SIZES)
-            tried = np.tile(found, (SIZES, 1))
-            tried[:, c] = sizes
-            logs = np.array([self._evidence(normal, score, width, one) for one in tried])
-            likely = np.exp(logs - np.max(logs))
-            found[c] = float(sizes @ likely / np.sum(likely))
-        return found
-
-    def _evidence(self, normal: Array, score: Array, width: int, size2: Array) -> float:
-        """log of the restricted likelihood of courses of these sizes [nat], but for a constant."""
-        variance = np.where(self.wave > 0, size2[self.channel] / np.maximum(self.wave, 1), FLAT)
-        prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
-        scale = np.sqrt(np.diag(normal) + prior)
-        whole = (normal + np.diag(prior)) / scale[:, None] / scale
-        lower = np.linalg.cholesky(whole + RIDGE * np.eye(len(whole)))
-        solved = cho_solve((lower, True), score / scale)
-        size = 2.0 * float(np.sum(np.log(np.diag(lower))))
-        size += 2.0 * float(np.sum(np.log(scale))) + float(np.sum(np.log(variance)))
-        return 0.5 * float(score @ (solved / scale)) - 0.5 * size
 
     def _weighted(self, level: NoiseLevel, remaining: Array, own: Array) -> Weighted:
         """Rows at the final weights and scale, the courses beside columns of a model's own."""
@@ -232,85 +188,38 @@ class States:
         if self.explained is not None:
             more = (root @ self.explained[:, axes]).reshape(len(part), -1)
         every = np.column_stack([part, error, more])
-        size2 = np.full(len(self.roles), START)
-        limit = self._limits(level)
+        sizing = self._sizing(level)
+        size2 = sizing.start
         for _ in range(REWEIGHTED):
             total = every.T @ (weight[:, None] * every) / scale2
             normal, score = total[: width + q, : width + q], total[: width + q, width + q]
             if more.shape[1]:
                 sized = _beside(total, np.r_[0:width, width + q + 1 : len(total)], width, q)
-                size2 = self._pooled(sized[0], self._sized(*sized, 0, size2, limit))
+                size2 = sizing.pooled(sized[0], sizing.likeliest(*sized, 0, size2))
             else:
-                size2 = self._sized(normal, score, width, size2, limit)
-            values, inverse = self._values(normal, score, width, size2)
+                size2 = sizing.likeliest(normal, score, width, size2)
+            values, inverse = sizing.values(normal, score, width, size2)
             freedom = float(np.sum(inverse * normal))
             left = error - part @ values
             scale2 = _scale2(left[judged.ravel()], freedom)
             far = np.abs(left) / math.sqrt(scale2)
             weight = known.ravel() * np.minimum(1.0, HUBER / np.maximum(far, HUBER))
+        if more.shape[1]:
+            size2 = np.maximum(size2, sizing.expected(*sized, 0, size2))
         prior = np.maximum(self.wave, 1) / size2[self.channel]
         prior = np.concatenate([np.zeros(width), prior])
         return Weighted(tuple(axes), root, part, error, weight / scale2, prior)
 
-    def _limits(self, level: NoiseLevel) -> Array:
-        """Most that a channel's variance may be, over the spec's."""
+    def _sizing(self, level: NoiseLevel) -> Sizing:
+        """Where a channel's variance may be at most the log's own noise, over the spec's."""
         structure = self.data.structure
         most: dict[SensorKey, float] = {SURVEY: 1.0} | {
             w.sensor: max(x, 1.0) ** 2 for w, x in zip(structure.white, level.factor, strict=True)
         }
         for part, slow in zip(structure.slow, level.slow, strict=True):
             most[part.sensor] *= max(1.0, *slow)
-        return np.array([most[sensor] for sensor, _ in self.roles])
-
-    def _sized(self, normal: Array, score: Array, width: int, size2: Array, limit: Array) -> Array:
-        """Variances of the channels by expectation and maximisation, from size2 on."""
-        own = np.diag(normal).copy()
-        share, moving = 1.0 / np.maximum(self.wave, 1), self.wave > 0
-        channel, count = self.channel[moving], np.bincount(self.channel[moving])
-        information = np.full(own.shape, 1e-12)
-        for _ in range(STEPS):
-            information[width:] = 1.0 / np.where(moving, size2[self.channel] * share, FLAT)
-            scale = 1.0 / np.sqrt(own + information)
-            whole = normal * scale[:, None] * scale
-            np.fill_diagonal(whole, (own + information) * scale**2)
-            inverse = inverse_of(whole, 1e-12)
-            values = scale * (inverse @ (scale * score))
-            energy = (values**2 + scale**2 * np.diag(inverse))[width:] / share
-            sized = np.clip(np.bincount(channel, energy[moving]) / count, LEAST**2, limit)
-            if np.all(np.abs(sized - size2) < STEADY_SIZE * size2):
-                return sized
-            size2 = sized
-        return size2
-
-    def _pooled(self, normal: Array, size2: Array) -> Array:
-        """Variances of the channels, where one tells little of its own nearer to those of its kin.
-
-        Kin share what makes them wander; what effects can make of one of them may leave too little
-        there to tell by itself.  A logarithm that t waves tell varies by 2 / t, those of kin by
-        KIN_SPREAD^2, so kin count as 2 / KIN_SPREAD^2 waves.  None is taken to be quieter than it
-        looks.
-        """
-        names = [(sensor, KIN.get((sensor[1], k), 0)) for sensor, k in self.roles]
-        kin = np.array([names.index(one) for one in names])
-        common = np.array([np.mean(size2[kin == one]) for one in kin])
-        _, inverse = self._values(normal, np.zeros(len(normal)), 0, common)
-        prior = common[self.channel] / np.maximum(self.wave, 1)
-        seen = np.clip(1.0 - np.diag(inverse) / prior, LEAST, 1.0) * (self.wave > 0)
-        told = np.bincount(self.channel, seen, len(self.roles))
-        logs, shared = np.log(size2), 2.0 / KIN_SPREAD**2
-        means = np.array([np.average(logs[kin == k], weights=told[kin == k]) for k in kin])
-        pooled: Array = np.exp((told * logs + shared * means) / (told + shared))
-        return np.maximum(size2, pooled)
-
-    def _values(self, normal: Array, score: Array, width: int, size2: Array) -> tuple[Array, Array]:
-        """Free columns and states at these variances, constants free as well, and covariance."""
-        share = 1.0 / np.maximum(self.wave, 1)
-        variance = np.where(self.wave > 0, size2[self.channel] * share, FLAT)
-        prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
-        scale = np.sqrt(np.diag(normal) + prior)
-        whole = (normal + np.diag(prior)) / scale[:, None] / scale
-        inverse = inverse_of(whole, 1e-12) / scale[:, None] / scale
-        return inverse @ score, inverse
+        limit = np.array([most[sensor] for sensor, _ in self.roles])
+        return Sizing(self.roles, self.channel, self.wave, limit)
 
 
 def _beside(total: Array, free: NDArray[np.int64], first: int, count: int) -> tuple[Array, Array]:
