@@ -53,7 +53,7 @@ class States:
 
     data: Data
     courses: Array
-    channel: Array  # (q,) which channel a course belongs to
+    channel: NDArray[np.int64]  # (q,) which channel a course belongs to
     wave: Array  # (q,) k
     block: NDArray[np.int64]  # (n,) stretch of every row
     seen: NDArray[np.int64] | None  # (n,) group of targets of every row, where they are few
