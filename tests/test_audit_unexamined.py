@@ -94,6 +94,9 @@ def test_a_cloud_says_nothing_of_its_stamps(tmp_path: Path) -> None:
     found, data = run(tmp_path / "cloud.las")
     assert found.exit_code == 2
     assert "order of space" in data["unexamined"][0]["reason"]
+    text = CliRunner().invoke(app, ["audit", str(tmp_path / "cloud.las")])
+    assert "Files of which nothing was examined" in text.stdout
+    assert "damaged" not in text.stdout
 
 
 def test_a_file_that_was_cut_is_not_plainly_sound(tmp_path: Path) -> None:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
-from syncline_design.auditing.result import Audit, StampFault, StreamAudit
+from syncline_design.auditing.result import Audit, IncompleteFile, StampFault, StreamAudit
 from syncline_design.auditing.stream import is_receipt
 from syncline_design.report import numbers
 from syncline_design.report.document import (
@@ -87,7 +87,10 @@ def on_audit(result: Audit) -> Document:
         sentences=tuple(_sentences(result)),
         facts=tuple(_facts(result)),
         sections=(
-            *section("incomplete", "Files that are damaged", _damaged(result), "Damaged"),
+            *section("incomplete", "Files that are damaged",
+                     _files("Damaged", (*result.damaged, *result.unreadable)), "Damaged"),
+            *section("unexamined", "Files of which nothing was examined",
+                     _files("Not examined", result.unexamined), "Not examined"),
             *section("faults", "Faults by stream", list(_faults(result)), "Faults"),
             *section("left", "What is left once every named fault is out",
                      show(_left(result), silent=True), "Residuals"),
@@ -164,12 +167,12 @@ def _facts(result: Audit) -> Iterator[tuple[str, str]]:
         yield "Longest stream", numbers.time(max(lengths))
 
 
-def _damaged(result: Audit) -> list[Node]:
+def _files(name: str, files: Sequence[IncompleteFile]) -> list[Node]:
     rows = [
         (Cell(one.file, code=True), one.reason, Cell(numbers.count(one.messages), one.messages))
-        for one in (*result.damaged, *result.unreadable, *result.unexamined)
+        for one in files
     ]
-    return show(table("Damaged", ("File", "Why", "Messages read #"), rows), silent=True)
+    return show(table(name, ("File", "Why", "Messages read #"), rows), silent=True)
 
 
 def _faults(result: Audit) -> Iterator[Node]:
