@@ -172,3 +172,13 @@ def test_a_clock_that_is_set_in_a_beat_of_which_some_show(tmp_path: Path) -> Non
     assert steps[0].parameters["count"] == moments.size
     assert steps[0].parameters["interval_s"] == pytest.approx(3.365, rel=0.01)
     assert steps[0].parameters["seconds"] == pytest.approx(-2e-4, rel=0.1)
+
+
+@pytest.mark.parametrize("tick_s", [0.004, 0.008, 0.016])
+def test_half_of_the_messages_wait_for_two_ticks_more(tmp_path: Path, tick_s: float) -> None:
+    """No delay is near the median of all: it lies between the two that there are."""
+    t = 0.0007 + np.arange(600) * 0.05
+    missed = np.random.default_rng(1).permutation(600) % 2 == 0
+    receive = (np.ceil(t / tick_s) + np.where(missed, 3, 1)) * tick_s
+    row = said(tmp_path, BEGAN_NS + ns(t), BEGAN_NS + ns(receive))
+    assert not counted(row)

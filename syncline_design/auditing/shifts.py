@@ -261,7 +261,8 @@ def _shows(when: Array, tick_s: float) -> bool:
 def _within_tick(late: Array, tick_s: float) -> Array:
     """Delays without whole ticks, where those that are longer are so by whole ticks: messages that
     missed one, and no tail of transport."""
-    turns = np.round((late - float(np.median(late))) / tick_s)
+    middle = np.sort(late)[late.size // 2]  # one of them: halfway between two, none may be near it
+    turns = np.round((late - middle) / tick_s)
     folded = late - turns * tick_s
     usual = np.percentile(folded[turns == 0.0], [1.0, 99.0])
     missed = folded[turns != 0.0]
