@@ -318,8 +318,9 @@ OTHER_MEANING = {"lever_arm", "sound_speed"}
 # Names of assumptions on a built system, which effects break.
 ASSUMPTIONS = {"latency", "mounting"}
 SPEAK_OF_ASSUMPTIONS = {
-    "assumptions.py", "by_log.py", "by_shift.py", "acceptance.py", "instead.py", "log_evidence.py",
-    "sarif.py", "shapes.py", "stretches.py", "suspects.py", "undone.py", "whole_delay.py",
+    "acceptance.py", "assumptions.py", "by_log.py", "by_scatter.py", "by_shift.py", "instead.py",
+    "log_evidence.py", "sarif.py", "shapes.py", "stretches.py", "suspects.py", "undone.py",
+    "whole_delay.py",
 }  # fmt: skip
 
 
