@@ -19,6 +19,7 @@ from syncline_design.auditing.witness import Side
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip
 _ENTERS: Final = 0.45  # s that the first message of a slip may be from whole seconds
+_EARLY: Final = 10.0  # percent of a slip's messages that may come sooner than any other
 _TRANSPORT_S: Final = 0.05
 _BLUR_S: Final = 0.2  # interquartile range of delays: from here on whole seconds are no mark
 _DRIFTING_S: Final = 0.03  # over the log: slower drifts do not blur whole seconds
@@ -102,7 +103,8 @@ def _is_slip(
     late: Array, turns: Array, run: tuple[int, int], pace: Cadence, series: Series,
     places: np.ndarray,
 ) -> bool:  # fmt: skip
-    """Long enough, whole seconds off, and level: waiting messages come ever less late."""
+    """Long enough, whole seconds off, and level: waiting messages come ever less late, and put
+    right they would come sooner than any other."""
     begin, end = run
     if end - begin < _LEAST_RUN:
         return False
@@ -113,7 +115,8 @@ def _is_slip(
     level = spread(inside) < max(3.0 * spread(right), 0.02)
     change = turns[begin] - turns[begin - 1]
     enters = begin == 0 or abs(late[begin] - late[begin - 1] - change) < _ENTERS
-    return apart < min(_WHOLE, max(calm, 0.01)) and level and enters
+    possible = float(np.percentile(inside, _EARLY)) > float(np.min(right)) - _WHOLE
+    return apart < min(_WHOLE, max(calm, 0.01)) and level and enters and possible
 
 
 def _side_of(
