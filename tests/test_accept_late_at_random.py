@@ -11,8 +11,16 @@ from syncline_design.diagnosis.late_at_random import late_at_random
 from syncline_design.diagnosis.late_rows import Late
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
+from syncline_design.diagnosis.whiles import gained_in_whiles
 from syncline_design.spec.load import load
-from tests.test_accept_late_rows import Mask, accepted, broken_alone, here_and_there, mixed
+from tests.test_accept_late_rows import (
+    Mask,
+    accepted,
+    broken_alone,
+    during,
+    here_and_there,
+    mixed,
+)
 from tests.test_accept_stretches import world
 from tests.world import Hidden, hidden, make_log
 from tests.world.trajectory import Array
@@ -90,6 +98,22 @@ def test_what_changed_once_does_not_take_turns(tmp_path: Path) -> None:
     spec = tmp_path / "spec.yaml"
     spec.write_text(before.spec_yaml(), "utf-8")
     assert looked_at(spec, write_columns(tmp_path / "log.csv", columns)) == ()
+
+
+@pytest.mark.parametrize("delay_s", [0.004, 0.015])
+def test_one_while_is_left_to_those_that_look_for_whiles(delay_s: float, tmp_path: Path) -> None:
+    """Delays that move a row by little more than noise are not told row by row."""
+    assert looked_at(*mixed(tmp_path, "position", delay_s, during(30.0, 48.0))) == ()
+
+
+def test_gains_in_whiles_are_those_of_plain_enumeration() -> None:
+    gain = np.random.default_rng(7).normal(0.0, 6.0, 14)
+    ends = 2.0 * np.log(14)
+    sums = {(a, b): float(np.sum(gain[a:b])) - ends for a in range(14) for b in range(a + 1, 15)}
+    one = max(0.0, *sums.values())
+    two = max(x + y for (_, b), x in sums.items() for (a, _), y in sums.items() if a >= b)
+    assert gained_in_whiles(gain, 1) == pytest.approx(one)
+    assert gained_in_whiles(gain, 2) == pytest.approx(max(one, two))
 
 
 @pytest.mark.parametrize(("device", "delay_s"), [("position", 0.06), ("attitude", 0.1)])

@@ -35,7 +35,9 @@ from syncline_design.diagnosis.late_rows import Late, acting_late
 from syncline_design.diagnosis.looked_up import Index, Mask, Weighed
 from syncline_design.diagnosis.reading_parts import readings_late
 from syncline_design.diagnosis.scene import Scene
+from syncline_design.diagnosis.two_delays import TwoDelays
 from syncline_design.diagnosis.undone import BUILD
+from syncline_design.diagnosis.whiles import gained_in_whiles, runs_of
 from syncline_design.effects import plain_delay
 from syncline_design.effects.record import ActsOn, Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -50,30 +52,13 @@ LOUDEST: Final = 2.0  # times the spec's noise, that the two may leave
 CHANCE: Final = 1e-4  # that late rows scatter so much more than the rest
 LEAST_ROWS: Final = 20  # of either kind
 LEAST_RUNS: Final = 5  # of late rows: fewer are whiles that come and go
+MOST_RUNS: Final = 200
 LEAST_S, MOST_S = 2e-3, 2.0  # of a delay
 ASIDE: Final = 0.1  # of a row's square over noise, from which it is left out
 BLOCKS: Final = 16
 STEPS, TIMES = 60, 12
 NEAR_S: Final = 1e-3
 ENDS: Final = ((0.1, 0.9), (0.02, 0.6), (0.4, 0.98), (0.25, 0.97), (0.03, 0.75))
-
-
-@dataclass(frozen=True, slots=True)
-class _Two:
-    """Two delays of a device: [s], chance of the second, how loud the noise is over the spec's
-    (variance), of each row how likely it is of the second, and the log-likelihood."""
-
-    delays: tuple[float, float]
-    chance: float
-    loud2: float
-    second: Array
-    log_l: float
-
-    def turned(self) -> _Two:
-        """The same with the second as the first."""
-        first, second = self.delays
-        return replace(self, delays=(second, first), chance=1.0 - self.chance,
-                       second=1.0 - self.second)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +116,7 @@ class _Asked:
     def components(self) -> float:
         return float(np.sum(self.freedom[self.counts]))
 
-    def two(self) -> _Two | None:
+    def two(self) -> TwoDelays | None:
         """The likeliest two delays; None where rows tell of none."""
         built = self._built()
         plain = self.left(0.0) - self.columns @ built
@@ -159,7 +144,7 @@ class _Asked:
         found: Array = values[:-1]
         return found
 
-    def _linear(self, plain: Array, first_s: float, second_s: float) -> _Two:
+    def _linear(self, plain: Array, first_s: float, second_s: float) -> TwoDelays:
         """Two delays by the rows' slopes alone, all else as it is."""
         weight = np.where(self.counts, self.weight, 0.0)
         dot = np.sum(self.along * plain, axis=1)
@@ -182,21 +167,21 @@ class _Asked:
 
     def _weighed(
         self, plain: Array, delays: tuple[float, float], chance: float, loud2: float
-    ) -> _Two:
+    ) -> TwoDelays:
         """By slopes: errors of delays a and b are plain - along a and b."""
         both = [np.sum((plain - self.along * d) ** 2, axis=1) for d in delays]
         return self._mixed(both, delays, chance, loud2)
 
     def _mixed(
         self, both: Sequence[Array], delays: tuple[float, float], chance: float, loud2: float
-    ) -> _Two:
+    ) -> TwoDelays:
         """How likely rows are of either, by their squares; the noise by these."""
         chance = min(max(chance, 1e-3), 1.0 - 1e-3)
         odds = math.log(chance / (1.0 - chance)) - 0.5 * (both[1] - both[0]) / loud2
         second = expit(odds)
         square = (1.0 - second) * both[0] + second * both[1]
         new2 = float(np.sum(square[self.counts])) / self.components
-        return _Two(delays, chance, new2, second, self._log_l(both, chance, new2))
+        return TwoDelays(delays, chance, new2, second, self._log_l(both, chance, new2))
 
     def _log_l(self, both: Sequence[Array], chance: float, loud2: float) -> float:
         logs = np.logaddexp(
@@ -204,7 +189,7 @@ class _Asked:
         )
         return float(np.sum(logs[self.counts])) - 0.5 * self.components * math.log(loud2)
 
-    def _polished(self, two: _Two, built: Array) -> _Two | None:
+    def _polished(self, two: TwoDelays, built: Array) -> TwoDelays | None:
         """The same by all of the motion, with all else free."""
         for _ in range(TIMES):
             if not max(abs(d) for d in two.delays) <= MOST_S:
@@ -215,7 +200,7 @@ class _Asked:
             step, built = self._step(two, lefts, slopes)
             delays = (two.delays[0] + float(step[0]), two.delays[1] + float(step[1]))
             chance = float(np.mean(two.second[self.counts]))
-            two = _Two(delays, chance, two.loud2, two.second, two.log_l)
+            two = TwoDelays(delays, chance, two.loud2, two.second, two.log_l)
             if np.max(np.abs(step)) < 1e-6:
                 break
         return two
@@ -226,7 +211,11 @@ class _Asked:
         return left, (self.left(delay_s + NEAR_S) - left) / NEAR_S
 
     def _step(
-        self, two: _Two, lefts: Sequence[Array], slopes: Sequence[Array], but: Mask | None = None
+        self,
+        two: TwoDelays,
+        lefts: Sequence[Array],
+        slopes: Sequence[Array],
+        but: Mask | None = None,
     ) -> tuple[Array, Array]:
         """Steps of both delays, and all else, by least squares over rows (but some)."""
         used = self.counts if but is None else self.counts & ~but
@@ -239,11 +228,13 @@ class _Asked:
             every = np.concatenate([self.columns, own], axis=2)
             normal += np.einsum("n,nik,nil->kl", share, every, every, optimize=True)
             score += np.einsum("n,nik,ni->k", share, every, left)
-        eye = np.diag(np.r_[np.ones(width), np.full(2, 1e-12)])
+        usual = 1.0 / BUILD["s"] ** 2  # of a delay, as of all else that a build can be wrong by
+        score[width:] -= usual * np.array(two.delays)
+        eye = np.diag(np.r_[np.ones(width), np.full(2, usual)])
         values = np.linalg.solve(normal + eye, score)
         return values[width:], values[:width]
 
-    def with_these(self, two: _Two, delays: tuple[float, float]) -> float:
+    def with_these(self, two: TwoDelays, delays: tuple[float, float]) -> float:
         """The log-likelihood with two delays as they are, and none of another device."""
         alone = replace(self, columns=self.columns[:, :, ~np.array(self.delays, bool)])
         lefts = [alone.left(d) for d in delays]
@@ -252,7 +243,7 @@ class _Asked:
         both = [np.sum((left - beside) ** 2, axis=1) for left in lefts]
         return self._log_l(both, two.chance, two.loud2)
 
-    def spread_s(self, two: _Two) -> float:
+    def spread_s(self, two: TwoDelays) -> float:
         """Standard uncertainty of how far the delays lie apart, by leaving out one stretch after
         the other and by the rows' noise, as wide as its 95 % interval asks."""
         lefts, slopes = zip(*(self._at(d) for d in two.delays), strict=True)
@@ -284,6 +275,13 @@ class _Asked:
         loud2 = max(square / self.components, 1e-300)
         return -0.5 * self.components * (1.0 + math.log(loud2))
 
+    def in_whiles(self, two: TwoDelays, most: int) -> float:
+        """The log-likelihood where rows of one of both come in at most so many whiles."""
+        both = [0.5 * each[self.counts] / two.loud2 for each in self._squares(two)]
+        own = max(gained_in_whiles(both[k] - both[1 - k], most) - float(np.sum(both[k]))
+                  for k in (0, 1))  # fmt: skip
+        return own - 0.5 * self.components * math.log(two.loud2)
+
     def any_value(self) -> float:
         """The log-likelihood of a delay that has any value in each row, as noise has."""
         plain = self.left(0.0) - self.columns @ self._built()
@@ -303,31 +301,36 @@ class _Asked:
         logs = -0.5 * float(np.sum(np.log(more[self.counts])))
         return logs - 0.5 * self.components * (1.0 + math.log(max(loud2, 1e-300)))
 
-    def holds(self, two: _Two) -> bool:
+    def holds(self, two: TwoDelays) -> bool:
         """Whether rows are clearly of two delays, of which either is noise."""
         spec2 = two.loud2 * self.louder
         return self.is_apart(two, APART) and spec2 <= LOUDEST**2 and self._alike(two)
 
-    def is_apart(self, two: _Two, times: float) -> bool:
+    def is_apart(self, two: TwoDelays, times: float) -> bool:
         """Whether two delays differ by so many standard deviations of the median row, and there
         are rows enough of either that take turns."""
         rows = (two.second > 0.5) & self.counts
         count = int(np.sum(rows))
-        if min(count, int(np.sum(self.counts)) - count) < LEAST_ROWS or _runs(rows) < LEAST_RUNS:
+        if min(count, int(np.sum(self.counts)) - count) < LEAST_ROWS or runs_of(rows) < LEAST_RUNS:
             return False
         apart = abs(two.delays[1] - two.delays[0])
         usual = math.sqrt(float(np.median(self.weight[self.counts])) / two.loud2)
         return apart >= LEAST_S and apart * usual >= times
 
-    def _alike(self, two: _Two) -> bool:
+    def _squares(self, two: TwoDelays) -> list[Array]:
+        """Of every row, with either delay (n,), all else at its best."""
+        lefts, slopes = zip(*(self._at(d) for d in two.delays), strict=True)
+        step, built = self._step(two, lefts, slopes)
+        return [np.sum((left + slope * own - self.columns @ built) ** 2, axis=1)
+                for left, slope, own in zip(lefts, slopes, step, strict=True)]  # fmt: skip
+
+    def _alike(self, two: TwoDelays) -> bool:
         """Whether rows of either delay scatter alike (F test)."""
         late = two.second > 0.5
-        lefts, slopes = zip(*(self._at(d) for d in two.delays), strict=True)
-        _, built = self._step(two, lefts, slopes)
-        beside = self.columns @ built
         means, counts = [], []
-        for own, delay_s in zip((self.counts & ~late, self.counts & late), two.delays, strict=True):
-            square = np.sum((self.left(delay_s) - beside)[own] ** 2)
+        squares = self._squares(two)
+        for own, each in zip((self.counts & ~late, self.counts & late), squares, strict=True):
+            square = np.sum(each[own])
             counts.append(int(np.sum(self.freedom[own])))
             means.append(float(square) / counts[-1])
         larger = int(means[1] > means[0])
@@ -351,19 +354,20 @@ def late_at_random(view: Scene, held: Mask) -> tuple[Late, ...]:
 
 def _clear(
     view: Scene, weighed: Weighed, held: Mask, sensor: ActsOn
-) -> Iterator[tuple[_Asked, _Two]]:
+) -> Iterator[tuple[_Asked, TwoDelays]]:
     asked = _Asked.of(view, weighed, held, sensor)
     if int(np.sum(asked.counts)) < 2 * LEAST_ROWS or not np.any(asked.along):
         return
     two = asked.two()
     if two is None or not asked.holds(two):
         return
-    rivals = (asked.any_value(), asked.changed_once())
-    if two.log_l - max(rivals) > CLEARLY_NATS:
+    few, many = (asked.in_whiles(two, most) for most in (LEAST_RUNS - 1, MOST_RUNS))
+    rivals = (asked.any_value(), asked.changed_once(), few)
+    if max(two.log_l, many) - max(rivals) > CLEARLY_NATS:
         yield asked, two
 
 
-def _later(asked: _Asked, two: _Two) -> _Two:
+def _later(asked: _Asked, two: TwoDelays) -> TwoDelays:
     """With the rows that are late as the second.
 
     Which of both is off is told by what a delay of 0 of either leaves with no delay of another
@@ -376,18 +380,13 @@ def _later(asked: _Asked, two: _Two) -> _Two:
     return two if early - late < AS_GOOD_NATS else two.turned()
 
 
-def _late(asked: _Asked, two: _Two) -> Late:
+def _late(asked: _Asked, two: TwoDelays) -> Late:
     apart_s = two.delays[1] - two.delays[0]
     off = np.minimum(asked.weight * apart_s**2 / two.loud2, 1.0)
     rows: Index = np.flatnonzero((two.second * off > ASIDE) & asked.counts)
     off_m = np.linalg.norm(np.nan_to_num(asked.view.error())[rows], axis=1)
     share = float(np.mean(two.second[asked.counts]))
     return Late(asked.sensor, rows, apart_s, asked.spread_s(two), off_m, single=True, of_log=share)
-
-
-def _runs(rows: Mask) -> int:
-    """How many runs of rows there are."""
-    return int(np.sum(np.diff(np.r_[False, rows].astype(int)) > 0))
 
 
 def _solved(columns: Array, left: Array, weight: Array) -> Array:
