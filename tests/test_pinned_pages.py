@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from pathlib import Path
 
 import pytest
@@ -66,9 +67,10 @@ def stamps(folder: Path) -> Path:
 
 
 def clock(folder: Path) -> Path:
-    """A morning of a clock that is half a microsecond late."""
+    """A morning of a clock that is half a microsecond late, give or take."""
     times = [1.7e9 + 16.0 * k for k in range(120)]
-    return write(folder / "tracking.log", tracking(times, [5e-7] * 120))
+    late = [5e-7 + 1e-7 * math.sin(k) for k in range(120)]
+    return write(folder / "tracking.log", tracking(times, late))
 
 
 @pytest.mark.parametrize("seed", [0, 7])
