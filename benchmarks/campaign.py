@@ -306,9 +306,7 @@ def _first_ring(changes: Changes, looks: range) -> int | None:
 
 
 def _rings(changes: Changes, look: int) -> bool:
-    """The doubt only lessens the evidence: it is asked where there is any."""
-    alarm = np.log(20.0)
-    return changes.mixed(look)[0] >= alarm and changes.log_evidence(look)[0] >= alarm
+    return bool(changes.log_evidence(look)[0] >= np.log(20.0))
 
 
 def quiet(kind: str, *, is_foreign: bool) -> None:

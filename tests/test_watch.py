@@ -235,7 +235,7 @@ def test_a_run_of_the_time_of_another_is_refused(spec: Path, tmp_path: Path) -> 
         store.unlink()
 
 
-@pytest.mark.parametrize(("bounds", "seed", "rang"), [(2.5, 203, 8), (3.8, 212, 9)])
+@pytest.mark.parametrize(("bounds", "seed", "rang"), [(2.5, 203, 8), (3.8, 300, 8)])
 def test_an_alarm_stays_when_earlier_days_come_in(
     spec: Path, tmp_path: Path, bounds: float, seed: int, rang: int
 ) -> None:

@@ -132,7 +132,7 @@ def test_scatter_beside_a_trend_is_that_of_a_weighted_fit() -> None:
 
 
 def test_scatter_beside_a_change_that_went_back_is_that_of_a_weighted_fit() -> None:
-    """The same of a mean and what some runs on end have besides; no run of one's own, no end."""
+    """The same of a mean and what some runs on end or one alone have besides; neither end."""
     rng = np.random.default_rng(69)
     count = 7
     sizes = rng.uniform(0.5, 4.0, (count, 1))
@@ -145,8 +145,8 @@ def test_scatter_beside_a_change_that_went_back_is_that_of_a_weighted_fit() -> N
         return float(np.linalg.lstsq(design, (np.sqrt(sizes) * values)[:, 0], rcond=None)[1][0])
 
     taken, begun, ended = taken_by_passing(runs)
-    assert len(taken) == 10
-    assert np.all(ended - begun >= 2)
+    assert len(taken) == 15
+    assert begun.min() > 0
     assert ended.max() < count
     for a, b, q in zip(begun, ended, taken[:, 0], strict=True):
         has = (np.arange(count) >= a) & (np.arange(count) < b)

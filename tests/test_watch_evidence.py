@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from syncline_design.campaign.changes import DRIFT, REACH, Changes
+from syncline_design.campaign.changes import DIFFERS_NATS, DRIFT, REACH, SIZES, Changes
 from syncline_design.campaign.pool import pool_of
 from syncline_design.campaign.scatter import APART, DIFFERING, log_odds_apart
 from syncline_design.campaign.trends import Trend, log_weights, trends, weight_of
@@ -49,36 +49,59 @@ def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
         scaled = covariance / unit[:, None] / unit
         return float(multivariate_normal(np.zeros(6 * p), scaled).logpdf(values / unit))
 
+    def changed(under: np.ndarray, told: np.ndarray) -> dict[tuple[int, int], float]:
+        """log w_k w_c B_ck of every course and effect; told: information (6, P, P) of the runs."""
+        found, base = {}, density(under)
+        for c, term in enumerate(changes.terms):
+            own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
+            size = np.linalg.cholesky(np.linalg.inv(told.mean(0)[np.ix_(own, own)]))
+            courses = [("step", k) for k in range(1, 6)] + [("drift", k) for k in range(1, 6)]
+            for row, (kind, k) in enumerate(courses):
+                column = np.zeros((6 * p, len(own)))
+                for r in range(k, 6):
+                    by = REACH if kind == "step" else DRIFT * (r - k + 1)
+                    column[[r * p + i for i in own]] = by * size
+                other = np.logaddexp.reduce([
+                    np.log(often) + density(under + times**2 * column @ column.T)
+                    for times, often in SIZES
+                ])  # fmt: skip
+                share = (0.9 if kind == "step" else 0.1) * weight_of(k + 1)
+                found[row, c] = np.log(share) + changes.log_weights[c] + float(other) - base
+        return found
+
     base = density(null)
     total, table = changes.log_evidence(6)
-    whole = [np.log(1.0 - sum(weight_of(k + 1) for k in range(1, 6)))]
-    for c, term in enumerate(changes.terms):
-        own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
-        size = np.linalg.cholesky(np.linalg.inv(normal.mean(0)[np.ix_(own, own)]))
-        for row, (kind, k) in enumerate([*(("step", k) for k in range(1, 6)),
-                                         *(("drift", k) for k in range(1, 6))]):  # fmt: skip
-            column = np.zeros((6 * p, len(own)))
-            for r in range(k, 6):
-                by = REACH if kind == "step" else DRIFT * (r - k + 1)
-                column[[r * p + i for i in own]] = by * size
-            other = density(null + column @ column.T)
-            share = 0.9 if kind == "step" else 0.1
-            expected = np.log(share * weight_of(k + 1)) + changes.log_weights[c] + other - base
-            assert table[row, c] == pytest.approx(expected, abs=1e-3)
-            whole.append(table[row, c])
-    apart = [0.0]
-    for term in changes.terms:
-        own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
+    none = float(np.log(1.0 - sum(weight_of(k + 1) for k in range(1, 6))))
+    alike = changed(null, normal)
+    for at, expected in alike.items():
+        assert table[at] == pytest.approx(expected, abs=1e-3)
+    whole = [none, *alike.values()]
+    apart, covers = [0.0], [null]
+    every = [(term.index, 0.0 if term.size == 1 else np.log(0.5)) for term in changes.terms]
+    axes = [t.index for t in changes.terms if t.size > 1]
+    every += [(at[[j]], np.log(0.5 / len(at))) for at in axes for j in range(len(at))]
+    assert len(every) == 6  # a latency, a bias, a datum and its three axes
+    for index, share in every:
+        own = [LABELS.index(changes.pool.labels[i]) for i in index]
         usual = np.linalg.inv(normal.mean(0)[np.ix_(own, own)])
-        for bounds, odds in zip(APART, log_odds_apart(len(changes.terms)), strict=True):
+        for bounds, own_odds in zip(APART, log_odds_apart(len(changes.terms)), strict=True):
+            odds = own_odds + share
             other = null.copy()
             for r in range(6):
                 at = [r * p + i for i in own]
                 other[np.ix_(at, at)] += bounds**2 * usual
             apart.append(odds + density(other) - base)
+            covers.append(other)
     assert changes.doubt(6) == pytest.approx(float(np.logaddexp.reduce(apart)), abs=1e-3)
     assert changes.doubt(6) > 1.0  # the oracle is asked where there is something to say
-    assert total == pytest.approx(float(np.logaddexp.reduce(whole)) - changes.doubt(6), abs=1e-9)
+    best = int(np.argmax(apart))
+    assert apart[best] > DIFFERS_NATS  # so changes beside that are looked for, too
+    own_cover = cover + covers[best] - null
+    told = np.array([np.linalg.inv(own_cover[k * p : (k + 1) * p, k * p : (k + 1) * p])
+                     for k in range(6)])  # fmt: skip
+    beside = np.logaddexp.reduce([none, *changed(covers[best], told).values()])
+    expected = float(np.logaddexp(np.logaddexp.reduce(whole), apart[best] + beside))
+    assert total == pytest.approx(expected - changes.doubt(6), abs=3e-3)
 
 
 def test_odds_of_differing_are_shared_by_effects_and_sizes() -> None:

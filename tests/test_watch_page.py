@@ -65,7 +65,7 @@ def test_the_courses_are_not_shifted_by_what_changed(spec: Path, tmp_path: Path)
 
 def test_evidence_beyond_the_figure_is_told_as_it_is(spec: Path, tmp_path: Path) -> None:
     """The figure ends at 1e12 and says so; its words are the e-values of the answer."""
-    runs = series(21, 9, np.array([30.0, 0, 0, 0, 0]) * BOUND, 6)
+    runs = series(21, 26, np.array([30.0, 0, 0, 0, 0]) * BOUND, 6)
     store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(runs)])
     last = told(spec, store, tmp_path, 1)["e_value"]
     assert last > 1e20

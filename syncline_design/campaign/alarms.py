@@ -43,6 +43,9 @@ def alarms_of(
             text = estimate(each, own, slopes[k].unit).text
             drift = Drift(each, own, text, last, None if until is None else True)
         value, sigma = grown * float(change.values[k]), float(whole[k])
+        given = grown * float(np.sqrt(max(change.covariance[k, k], 0.0)))
+        if NORMAL_95 * given < abs(value) <= NORMAL_95 * sigma:
+            sigma = given  # which run is the first has an interval of its own
         half = NORMAL_95 * sigma
         e_value = math.exp(min(one.log_evidence, 690.0))
         yield Alarm(
@@ -58,7 +61,7 @@ def alarms_of(
             since=since_of(runs, change.k, one.low, one.high),
             evidence=f"e-value {e_value_text(e_value)}, alarm from {to_digits(1.0 / rate, 3)} on",
             e_value=e_value,
-            first_run=runs[one.first_look - 1].number,
+            first_run=max(runs[k].number for k in (one.first_look - 1, change.k)),
             aliases=others_of(one.others, stage),
             drift=drift,
         )

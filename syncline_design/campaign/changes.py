@@ -6,7 +6,8 @@ information and of the prior of b, and with J = sum h I[c, :],
     N = sum h^2 I[c, c] - J S_n^-1 J',   s = sum h g[c] - J S_n^-1 g,
 and with d ~ N(0, D), D of REACH bounds of one run (of a drift of DRIFT from run to run), the Bayes
 factor for the change is
-    B_ck = |1 + N D|^-1/2 exp(s' (N + D^-1)^-1 s / 2).
+    B_ck = |1 + N D|^-1/2 exp(s' (N + D^-1)^-1 s / 2),
+mixed over SIZES of D: what differs from run to run may do so by as much.
 What the build has all along is no alarm: effects that all runs together show as constants may have
 any value that they can have.  Those that they do not show are small: 0 to within PLAUSIBLE of their
 own standard deviations by all these runs.  Were every one of them free, a day that is driven
@@ -14,13 +15,15 @@ otherwise than the days before would say next to nothing: some sum of constants 
 not show would do for any change.
 An effect that differs from run to run while nothing is moved would pass for a change of it, or of a
 commoner one that moves the runs alike.  So the runs are held against that, too: L_a is how much
-likelier they are where effect a has a value of its own in every run, normal about the common one,
-and p_a the odds of it.  What clearly differs (Q of its runs, beside any trend of it and the
-likeliest change of all) is freed in each run to the extent that it does, for all others too.
+likelier they are where effect a, or one parameter of it alone, has a value of its own in every run,
+normal about the common one, and p_a the odds of it (`parts`).  What clearly differs (Q of its runs,
+beside any trend of it and the likeliest change of all) is freed in each run to the extent that it
+does, for all others too.
 Mixed over effects with weights w_c (the common ones have more) and over trends from any k with
 weights w_k, each of sum one (changes that did not happen yet count one),
-    E_n = sum w_k w_c B_ck / (1 + sum p_a L_a)
-is an e-process: with one value of every effect, or with values that differ as the mixture has it,
+    E_n = (sum w_k w_c B_ck + p_m L_m sum w_k w_c B_ck|m) / (1 + sum p_a L_a)
+with m what most likely differs, free in every run for the second sum (a change beside it), is an
+e-process: with one value of every effect, or with values that differ as the mixture has it,
 it reaches 1 / alpha at any look, of however many, with a chance of at most alpha (Ville's
 inequality; docs/joint.md has what single sizes of scatter come to).
 Noise inside runs that is not the model's: the variance grows by what the scatter of the parts of
@@ -32,94 +35,40 @@ e-processes; Shin, Ramdas, Rinaldo, New England J. Stat. Data Sci. 2 (2024), on 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.constants import PLAUSIBLE, shown_constants
-from syncline_design.campaign.differing import clearly_differing
+from syncline_design.campaign.differing import clearly_differing, may_be_freed
+from syncline_design.campaign.differing_odds import likeliest_of, log_of_sizes
 from syncline_design.campaign.freed_runs import (
     freed_by_trends,
-    marginal,
     pseudo_inverse,
     with_beside,
     with_own_free,
 )
-from syncline_design.campaign.looks import KeptLook
+from syncline_design.campaign.parts import EffectPart
 from syncline_design.campaign.passing import passing_change
-from syncline_design.campaign.pool import Pool, Term, inverted
-from syncline_design.campaign.run_records import Change, Differing, Freed, Runs, SameSize
-from syncline_design.campaign.scatter import (
-    APART,
-    EffectInRuns,
-    RunScatter,
-    freed_of,
-    log_bayes,
-    log_differing,
-    log_odds_apart,
-    scattered,
-)
+from syncline_design.campaign.pool import Pool, inverted
+from syncline_design.campaign.run_records import Change, Differing, Freed, Runs
+from syncline_design.campaign.run_sums import RunSums
+from syncline_design.campaign.scatter import RunScatter, freed_of, log_bayes
 from syncline_design.campaign.trends import Trend, later, log_weights, trends
-from syncline_design.campaign.within_runs import scatter_within
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
-from syncline_design.machine.quick_dataclass import dataclass
 
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
 DRIFT: Final = 1.0  # bounds of one run: the change from run to run of the drift that is looked for
-MOST_SCATTERED: Final = 2
+SIZES: Final = ((1.0, 0.7), (4.0, 0.3))  # times as large, and how often
+DIFFERS_NATS: Final = 1.0  # odds from which changes beside what differs are looked for, too
+FEWEST_PASSED: Final = 4  # runs
 
 
-@dataclass(frozen=True, eq=False)
-class Changes:
-    """All changes that runs could show, in their order.
-
-    kept: what looks at the first of these runs found, so that none of it is computed again.
-    beside: changes that are taken off; what is left of each is free beside all others, or the first
-    that is told would keep what it took of the second.
-    """
-
-    pool: Pool
-    kept: tuple[KeptLook, ...] = ()
-    beside: tuple[Change, ...] = ()
-
-    @cached_property
-    def terms(self) -> tuple[Term, ...]:
-        return self.pool.terms
-
-    @cached_property
-    def groups(self) -> tuple[SameSize, ...]:
-        """The terms by size: small matrices of one size are worked on at once."""
-        sizes = sorted({term.size for term in self.terms})
-        places = [[k for k, t in enumerate(self.terms) if t.size == size] for size in sizes]
-        return tuple(
-            SameSize(np.array(own), np.array([self.terms[k].index for k in own])) for own in places
-        )
-
-    @cached_property
-    def prior(self) -> Array:
-        """Prior information of what may have any value that it can have, (P,)."""
-        found = np.zeros(len(self.pool.labels))
-        for term in self.terms:
-            found[term.index] = [p.high**-2.0 for p in term.effect.slopes()]
-        return found
-
-    @cached_property
-    def within(self) -> Array:
-        """Variance by the scatter of parts over that fitted, of every run and effect, (L, C)."""
-        known = [np.array(look.within) for look in self.kept[: self.pool.count]]
-        rest = [self.within_of(run) for run in range(len(known), self.pool.count)]
-        return np.array([*known, *rest]).reshape(self.pool.count, len(self.terms))
-
-    def within_of(self, run: int) -> Array:
-        """The same of one run, (C,)."""
-        if not self.pool.less[run]:
-            return np.ones(len(self.terms))
-        known = pseudo_inverse(self.pool.normal[run] + np.diag(self.prior))
-        return scatter_within(self.pool, run, self.groups, known)
+class Changes(RunSums):
+    """All changes that runs could show, in their order."""
 
     @cached_property
     def log_weights(self) -> Array:
@@ -131,12 +80,32 @@ class Changes:
     def log_evidence(self, look: int) -> tuple[float, Array]:
         """log E_n of the first `look` runs, and log w_k w_c B_ck of every course and effect."""
         mixed, table = self.mixed(look)
-        return mixed - self.doubt(look), table
+
+        def beside(free: Runs) -> float:
+            found = self._weighted(look, freed_by_trends(free, self.groups), free)
+            return self._summed(look, found)
+
+        return self._held(look, mixed, beside), table
+
+    def _held(self, look: int, alike: float, beside: Callable[[Runs], float]) -> float:
+        """log of a sum of evidence where nothing differs and where what most likely does is free in
+        every run, by their odds, over all odds that anything differs."""
+        odds = self.log_odds(look)
+        if odds.size and odds.max() > DIFFERS_NATS:
+            runs = self.compared(look)
+            one = likeliest_of(runs, self.parts, odds)
+            own = freed_of(runs.normal, runs.score, one.term.index, one.covariance)
+            more = beside(self._compared(look, *own))
+            alike = float(np.logaddexp(alike, odds.max() + more))
+        return alike - float(np.logaddexp.reduce([0.0, *odds.ravel()]))
+
+    def _summed(self, look: int, table: Array) -> float:
+        return float(np.logaddexp.reduce([*table.ravel(), math.log(later(look + 1))]))
 
     def mixed(self, look: int) -> tuple[float, Array]:
         """The same where no effect may differ from run to run: log sum w_k w_c B_ck."""
         table = self._weighted(look, self._freed(look), self.compared(look))
-        return float(np.logaddexp.reduce([*table.ravel(), math.log(later(look + 1))])), table
+        return self._summed(look, table), table
 
     def _weighted(self, look: int, freed: Freed, runs: Runs) -> Array:
         """log w_k w_c B_ck of every course and effect, (2 (look - 1), C)."""
@@ -170,9 +139,16 @@ class Changes:
 
     def of_one_day(self, look: int, rows: Sequence[int]) -> float:
         """log of the mean Bayes factor of any effect by some courses, which a change has that was
-        told: that something happened then is known, and no date or scatter is held against it."""
-        factors = self._factors(self._freed(look), self.compared(look), self.inside(look))
-        return float(np.max(np.logaddexp.reduce(factors[list(rows)] + self.log_weights, axis=1)))
+        told: that something happened then is known, and no date is held against it."""
+
+        def likeliest(freed: Freed, runs: Runs) -> float:
+            factors = self._factors(freed, runs, self.inside(look))[list(rows)] + self.log_weights
+            return float(np.max(np.logaddexp.reduce(factors, axis=1)))
+
+        alike = likeliest(self._freed(look), self.compared(look))
+        return self._held(
+            look, alike, lambda free: likeliest(freed_by_trends(free, self.groups), free)
+        )
 
     def doubt(self, look: int) -> float:
         """log (1 + sum p_a L_a): how much likelier the first runs are where some effect may differ
@@ -180,20 +156,53 @@ class Changes:
         return float(np.logaddexp.reduce([0.0, *self.log_odds(look).ravel()]))
 
     def log_odds(self, look: int) -> Array:
-        """log p_a L_a of every effect, by each of APART, (C, S)."""
-        return self._log_odds(look, self.compared(look))
+        """log p_a L_a of every part, by each of APART, (U, S)."""
+        return self._log_odds(look, self.compared(look), self.parts)
 
-    def _log_odds(self, look: int, runs: Runs, *off: Change) -> Array:
-        """The same of runs less what changes make."""
-        inside, prior = self.inside(look), runs.total - runs.normal.sum(axis=0)
-        score = runs.score - sum(one.made(runs.normal) for one in off)
-        usual = runs.normal.mean(axis=0)
-        found = np.zeros((len(self.terms), len(APART)))
-        for k, (term, factor) in enumerate(zip(self.terms, inside, strict=True)):
-            spread = inverted(usual[np.ix_(term.index, term.index)]) * factor
-            own = runs.normal / factor, score / factor, prior / factor
-            found[k] = log_odds_apart(len(self.terms)) + log_differing(*own, term.index, spread)
-        return found
+    def log_odds_of_any(self, look: int) -> float:
+        """log of the odds that some part differs by one of APART, clearly or not, against none."""
+        runs = self._compared(look, *with_beside(self.pool, look, self.beside))
+        return float(np.logaddexp.reduce([0.0, *self._log_odds(look, runs, self.parts).ravel()]))
+
+    def explained(self, look: int, ones: Sequence[Change]) -> float:
+        """How much likelier [nat] runs are with changes than without, by the noise fitted, with one
+        value of everything else:
+            sum (g' m - m' I m / 2) + (G - W)' S^-1 (G - W) / 2 - G' S^-1 G / 2,
+        m of a run what the changes make of its parameters, W = sum I m, G the sum of its scores."""
+        normal, score = self.pool.normal[:look], self.pool.score[:look]
+        moved = sum(one.made(normal) for one in ones)
+        away = np.zeros_like(score)
+        for one in ones:
+            away[:, one.term.index] += one.trend.over(look)[:, None] * one.values
+        inverse = pseudo_inverse(self.total(look, normal, score - moved))
+        whole = score.sum(axis=0)
+        left = whole - np.sum(moved, axis=0)
+        own = float(np.sum(away * (score - 0.5 * moved)))
+        return own + 0.5 * float(left @ inverse @ left - whole @ inverse @ whole)
+
+    def log_of_sizes(self, one: Change, noise: float, look: int) -> float:
+        """log of how much less likely a change is, its size (of a drift that by run) one of all by
+        APART as what differs has them, than it is at its best."""
+        usual = self.pool.normal[:look].mean(axis=0)[np.ix_(one.term.index, one.term.index)]
+        return log_of_sizes(one.values, noise * one.covariance, inverted(usual))
+
+    def passed(self, look: int) -> Change | None:
+        """A change that went back, where it is likelier than what differs from run to run."""
+        if look < FEWEST_PASSED:
+            return None
+        runs = self._compared(look, *with_beside(self.pool, look, self.beside))
+        one = passing_change(self.parts, self.part_groups, runs.parts)
+        if one is None or one.log_factor <= self._log_odds(look, runs, self.parts).max():
+            return None
+        return one
+
+    def differs_rather(self, look: int) -> Differing | None:
+        """What has another value in every run where that is likelier than any change is, whether
+        clearly or not; None where it is not."""
+        odds = self.log_odds(look)
+        if not odds.size or odds.max() <= max(0.0, self.mixed(look)[0]):
+            return None
+        return likeliest_of(self.compared(look), self.parts, odds)
 
     @cached_property
     def course(self) -> Array:
@@ -219,11 +228,11 @@ class Changes:
             inside = noise[group.terms]
             usual = inverted(runs.normal.mean(axis=0)[group.blocks])
             for rows, reach in ((slice(steps), REACH), (slice(steps, None), DRIFT)):
-                found[rows, group.terms] = log_bayes(
-                    normal[rows] / inside[:, None, None],
-                    score[rows] / inside[:, None],
-                    reach**2 * usual,
-                )
+                own = normal[rows] / inside[:, None, None], score[rows] / inside[:, None]
+                found[rows, group.terms] = np.logaddexp.reduce(
+                    [math.log(share) + log_bayes(*own, (times * reach) ** 2 * usual)
+                     for times, share in SIZES]
+                )  # fmt: skip
         return found
 
     def change(self, look: int, row: int, c: int) -> Change:
@@ -283,10 +292,6 @@ class Changes:
             found[:, group.terms] = scatter.factor[:-1]
         return np.asarray(self.inside(look) * found)
 
-    def inside(self, look: int) -> Array:
-        """Variance by the scatter of the parts of runs over that fitted, (C,)."""
-        return np.asarray(np.maximum(1.0, self.within[:look].mean(axis=0)))
-
     @cached_property
     def between(self) -> Array:
         """Scatter of the first k runs over what it is by chance, of k from 1 and c, (L, C)."""
@@ -316,21 +321,27 @@ class Changes:
             likely = self._likeliest_of(look, first) if look > 2 else None
             off = () if likely is None else (likely,)
             found = self._compared(look, first.normal, first.score, *off)
-            one = self._clear(found, whole := first.scatters)
+            one = self._clear(look, found, whole := first.parts, off)
             if one is not None:
                 passing = self._beside_passing(look, first, found, off)
                 found, one = next(((runs, None) for runs in passing), (found, one))
-            while one is not None and len(found.freed) < MOST_SCATTERED:
+            while one is not None and may_be_freed(one, found.freed):
                 freed = (*found.freed, one)
                 own = freed_of(found.normal, found.score, one.term.index, one.covariance)
                 found = replace(self._compared(look, *own, *off), freed=freed)
-                one = self._clear(found, whole)
+                one = self._clear(look, found, whole, off)
             self._latest.clear()
-            self._latest[look] = replace(found, whole=whole)
+            self._latest[look] = found
         return self._latest[look]
 
-    def _clear(self, runs: Runs, whole: Sequence[RunScatter]) -> Differing | None:
-        return clearly_differing(self.terms, self.groups, runs.normal, runs.scatters, whole)
+    def _clear(
+        self, look: int, runs: Runs, whole: Sequence[RunScatter], off: tuple[Change, ...] = ()
+    ) -> Differing | None:
+        def likelier(parts: Sequence[EffectPart]) -> Array:
+            return np.asarray(np.max(self._log_odds(look, runs, parts, *off), axis=1))
+
+        own = self.parts, self.part_groups, runs.normal, runs.parts
+        return clearly_differing(*own, whole, likelier)
 
     def _beside_passing(
         self, look: int, first: Runs, found: Runs, off: tuple[Change, ...]
@@ -338,18 +349,20 @@ class Changes:
         """Runs that do not differ beside a change that went back, beside the likeliest or alone,
         where that is likelier than any effect that differs from run to run."""
         for known, runs in ((off, found), ((), first)):
-            one = passing_change(self.terms, self.groups, runs.scatters)
-            if one is not None and one.log_factor > self._log_odds(look, first, *known).max():
+            one = passing_change(self.parts, self.part_groups, runs.parts)
+            if one is None:
+                continue
+            if one.log_factor > self._log_odds(look, first, self.parts, *known).max():
                 less = self._compared(look, first.normal, first.score, *known, one)
-                if self._clear(less, first.scatters) is None:
+                if self._clear(look, less, first.parts, (*known, one)) is None:
                     yield less
 
     def apart(self, look: int) -> Differing | None:
         """The effect in which the first `look` runs most clearly are not all alike, by whatever
         change or scatter; None where noise would do."""
-        runs = self.compared(look)
-        every = [one.of_all for one in runs.whole]
-        return clearly_differing(self.terms, self.groups, runs.normal, every, every)
+        runs = self._compared(look, *with_beside(self.pool, look, self.beside))
+        every = tuple(one.of_all for one in runs.parts)
+        return self._clear(look, replace(runs, parts=every), every)
 
     def likeliest(self, look: int) -> Change | None:
         """The likeliest change by the noise fitted; None where none is likelier."""
@@ -364,35 +377,6 @@ class Changes:
     def differing(self, look: int) -> tuple[Differing, ...]:
         """Effects that clearly differ from run to run, of the first `look` runs."""
         return self.compared(look).freed
-
-    def _compared(self, look: int, normal: Array, score: Array, *likely: Change) -> Runs:
-        """Runs, with Cochran's Q of each effect alone, the values of all others those of these runs
-        together, less what likely changes make; beside every course of the effect, and alone."""
-        total = self.total(look, normal, score)
-        inverse = pseudo_inverse(total)
-        left = score - sum(one.made(normal) for one in likely)
-        left = left - normal @ (inverse @ left.sum(axis=0))
-        found = []
-        for g in self.groups:
-            blocks = normal[:, *g.blocks]
-            squares = scattered(blocks, inverted(blocks), left[:, g.index])
-            seen = np.sum(np.einsum("rgaa->rga", blocks) > 0.0, axis=-1)
-            inside = self.inside(look)[g.terms]
-            own = EffectInRuns(blocks, left[:, g.index], seen, inside)
-            found.append(RunScatter.of(squares / inside, own))
-        return Runs(normal, score, total, inverse, tuple(found))
-
-    def total(self, look: int, normal: Array, score: Array) -> Array:
-        """Information of runs, with the prior of what they show; what is beside is free."""
-        found, size = normal.sum(axis=0), len(self.pool.labels)
-        total, scores = marginal(found, score.sum(axis=0), size)
-        prior, held = np.diag(found)[:size] / PLAUSIBLE**2, np.zeros_like(total)
-        groups = tuple((g.terms, g.index) for g in self.groups)
-        for one in shown_constants(total, scores, groups, self.inside(look)):
-            prior[one.index] = 0.0
-            held[np.ix_(one.index, one.index)] = one.prior
-        found[:size, :size] += held + np.diag(np.maximum(prior, self.prior))
-        return np.asarray(found)
 
     def without(self, *ones: Change) -> Changes:
         """The same runs with changes taken off those that have them."""

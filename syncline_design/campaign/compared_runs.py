@@ -94,7 +94,7 @@ class ComparedRuns:
 
     @cached_property
     def seen(self) -> tuple[Seen, ...]:
-        """Changes that were alarmed at any look so far, the strongest first."""
+        """Changes that were alarmed at any look so far, in the order of the runs."""
         first = self.first_look
         return () if first is None else seen_changes(self.changes, first, self.threshold)
 

@@ -17,7 +17,7 @@ from syncline_design import __version__
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 
-METHOD: Final = "looks/10"  # another where the evidence is computed in another way
+METHOD: Final = "looks/11"  # another where the evidence is computed in another way
 MOST_RATIO: Final = 1e30
 ALIKE: Final = 1e-3  # nat, and of a variance: more than what another machine rounds otherwise
 

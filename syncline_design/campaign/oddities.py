@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -177,13 +178,18 @@ def _dated_long_before(runs: Sequence[Entry]) -> Iterator[str]:
 
 
 def scattering(changes: Changes, seen: Sequence[Change], look: int) -> Iterator[Differing]:
-    """Effects that have another value in every run: no change, and nothing to count on."""
+    """Effects that have another value in every run: no change, and nothing to count on; what
+    several parameters of one differ by as one."""
     changes = changes.without(*seen)  # what moves along with a change is told by it
     told = {one.term.label for one in seen}
+    every: dict[tuple[str, str, int], list[Differing]] = {}
     for found in changes.differing(look):
+        # two that move the runs alike have one name
         if found.named.label not in told and _beyond_noise(found, look):
-            told.add(found.named.label)  # two that move the runs alike have one name
-            yield found
+            every.setdefault(found.named.label, []).append(found)
+    for parts in every.values():
+        covariance = np.sum([one.named_covariance for one in parts], axis=0)
+        yield replace(parts[0], named_covariance=covariance)
 
 
 def unsettled_in(changes: Changes, look: int, stage: Callable[[int], str]) -> Unsettled | None:
@@ -193,7 +199,8 @@ def unsettled_in(changes: Changes, look: int, stage: Callable[[int], str]) -> Un
         return None
     name, sensor, place = found.named.label
     names = [p.name for p in found.named.effect.slopes()]
-    sizes = dict(zip(names, map(float, found.spread), strict=True))
+    spread = zip(names, map(float, found.spread), strict=True)
+    sizes = {parameter: size for parameter, size in spread if size > 0.0}
     return Unsettled(name, sensor, stage(place), sizes, found.log_p / math.log(10.0))
 
 
@@ -231,9 +238,15 @@ def _not_settled(one: Unsettled) -> str:
 
 
 def _sizes(effect: Effect, spread: Mapping[str, float]) -> str:
-    """`5.2 mm and 6 mm`."""
+    """`5.2 mm`, of an effect with several parameters `north 5.2 mm and east 6 mm`."""
     units = {p.name: p.unit for p in effect.slopes()}
-    return " and ".join(
-        format_estimate(float(to_digits(float(size), 2)), None, units[name])
+    texts = {
+        name: format_estimate(float(to_digits(float(size), 2)), None, units[name])
         for name, size in spread.items()
+        if size > 0.0
+    }
+    if len(units) == 1:
+        return sentence_list(list(texts.values()))
+    return sentence_list(
+        [f"{split_suffix(name)[0].replace('_', ' ')} {text}" for name, text in texts.items()]
     )

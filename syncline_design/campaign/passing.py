@@ -17,38 +17,44 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.campaign.pool import Index, Term, inverted
+from syncline_design.campaign.parts import EffectPart
+from syncline_design.campaign.pool import Index, inverted
 from syncline_design.campaign.run_records import Change, SameSize
 from syncline_design.campaign.scatter import EffectInRuns, RunScatter, explained
 from syncline_design.campaign.trends import Trend
+from syncline_design.diagnosis.candidates import commonness
 from syncline_design.effects.record import Array
 
-SHORTEST: Final = 2  # runs that have it; one alone is an odd one
+AS_GOOD_NATS: Final = 2.0
+FEWEST_OTHERS: Final = 3  # runs beside the one that is odd
 
 
 def passing_change(
-    terms: Sequence[Term], groups: Sequence[SameSize], scatters: Sequence[RunScatter]
+    parts: Sequence[EffectPart], groups: Sequence[SameSize], scatters: Sequence[RunScatter]
 ) -> Change | None:
-    """Of any effect the change that went back which takes most of the scatter; None of few runs."""
-    best: Change | None = None
+    """Of any effect or parameter the change that went back which takes most of the scatter, the
+    commonest of those that do as well; None of few runs."""
+    tried: list[tuple[float, EffectPart, Change]] = []
     for g, scatter in zip(groups, scatters, strict=True):
-        if len(scatter.runs.normal) < SHORTEST + 2:
+        if len(scatter.runs.normal) < FEWEST_OTHERS + 1:
             return None
         taken, begun, ended = taken_by_passing(scatter.runs)
-        tried = g.index.shape[1] + math.log(len(terms) * len(begun))
-        factors = 0.5 * taken / scatter.runs.inside - tried
-        row, place = np.unravel_index(int(np.argmax(factors)), factors.shape)
-        if best is None or factors[row, place] > best.log_factor:
-            span = int(begun[row]), int(ended[row])
-            one = _fitted(terms[g.terms[place]], scatter.runs, int(place), *span)
-            best = replace(one, log_factor=float(factors[row, place]))
-    return best
+        charge = g.index.shape[1] + math.log(len(parts) * len(begun))
+        factors = 0.5 * taken / scatter.runs.inside - charge
+        for place, row in enumerate(np.argmax(factors, axis=0)):
+            part, span = parts[g.terms[place]], (int(begun[row]), int(ended[row]))
+            factor = float(factors[row, place])
+            tried.append((factor, part, _fitted(part, scatter.runs, place, *span)))
+    most = max(factor for factor, _, _ in tried)
+    close = [one for one in tried if one[0] >= most - AS_GOOD_NATS]
+    factor, _, best = min(close, key=lambda one: (commonness(one[1].term.label), -one[0]))
+    return replace(best, log_factor=factor)
 
 
 def taken_by_passing(runs: EffectInRuns) -> tuple[Array, Index, Index]:
     """What each takes of Q (B, G), its first run and the first that has it no more (B,)."""
     count = len(runs.normal)
-    spans = [(a, b) for a in range(1, count) for b in range(a + SHORTEST, count)]
+    spans = [(a, b) for a in range(1, count) for b in range(a + 1, count)]
     begun, ended = np.array(spans, dtype=np.int64).T
     normal, score = (_between(of, begun, ended) for of in (runs.normal, runs.score))
     whole, scores = runs.normal.sum(axis=0), runs.score.sum(axis=0)
@@ -63,10 +69,11 @@ def _between(values: Array, begun: Index, ended: Index) -> Array:
     return found
 
 
-def _fitted(term: Term, runs: EffectInRuns, place: int, begun: int, ended: int) -> Change:
+def _fitted(part: EffectPart, runs: EffectInRuns, place: int, begun: int, ended: int) -> Change:
     """What the runs from one to before another have of it beside the others."""
     inside = (np.arange(len(runs.normal)) >= begun) & (np.arange(len(runs.normal)) < ended)
     both = [(inverted(runs.normal[rows, place].sum(axis=0)), runs.score[rows, place].sum(axis=0))
             for rows in (inside, ~inside)]  # fmt: skip
     (here, own), (there, other) = both
-    return Change(term, Trend("step", begun, ended), here @ own - there @ other, here + there, 0.0)
+    values, known = part.values(here @ own - there @ other), part.covariance(here + there)
+    return Change(part.term, Trend("step", begun, ended), values, known, 0.0)

@@ -80,8 +80,8 @@ class Runs:
     """Information and score of runs, their sum with the prior and its inverse, and the scatter of
     each effect.
 
-    freed: what clearly differs from run to run.  whole: the scatter before any change was taken
-    off or effect freed.
+    freed: what clearly differs from run to run.  parts: the scatter of each effect, and then of
+    single parameters.
     """
 
     normal: Array
@@ -89,5 +89,5 @@ class Runs:
     total: Array
     inverse: Array
     scatters: tuple[RunScatter, ...]
+    parts: tuple[RunScatter, ...]
     freed: tuple[Differing, ...] = ()
-    whole: tuple[RunScatter, ...] = ()

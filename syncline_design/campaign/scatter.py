@@ -13,7 +13,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 RUNS_KNOWN: Final = 17.0  # runs that the noise fitted counts for, against the scatter of runs
-APART: Final = (1.0, 3.0)  # bounds of a run by which an effect may differ from run to run
+APART: Final = (1.0, 3.0, 10.0)  # bounds of a run by which an effect may differ from run to run
 DIFFERING: Final = 0.3  # odds of some effect differing from run to run against none doing so
 ROUNDED: Final = 1e-12
 

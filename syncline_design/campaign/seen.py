@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -11,7 +11,11 @@ import numpy as np
 
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.pool import Term, inverted
-from syncline_design.campaign.possible_changes import RIVAL_NATS, PossibleChange
+from syncline_design.campaign.possible_changes import (
+    RIVAL_NATS,
+    PossibleChange,
+    PossibleChanges,
+)
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.trends import trends
 from syncline_design.campaign.what_changed import Taken, possible_beside, what_changed
@@ -42,8 +46,8 @@ class Seen:
 
 
 def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, ...]:
-    """What changed in runs of which the look after `first` of them rang: the strongest first, and
-    of one effect in the order of the runs."""
+    """What changed in runs of which the look after `first` of them rang: in the order of the runs,
+    the strongest of a run first."""
     told = list(what_changed(changes, first, threshold))
     count = changes.pool.count
     while True:
@@ -51,7 +55,7 @@ def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, 
         weakest = min(range(len(told)), key=lambda k: _explained(fitted[k]))
         if _explained(fitted[weakest]) >= threshold:
             seen = [_seen(changes, told, k, fitted, first) for k in range(len(told))]
-            return tuple(_in_order(_with_ends(seen)))
+            return tuple(sorted(_with_ends(seen), key=lambda one: one.change.k))
         if len(told) == 1:
             return (_went_back(changes, told[0], first),)
         told.pop(weakest)
@@ -71,15 +75,6 @@ def _with_ends(seen: Sequence[Seen]) -> list[Seen]:
     return kept
 
 
-def _in_order(seen: Sequence[Seen]) -> Iterator[Seen]:
-    """The same places, changes of one effect in them in the order of their runs."""
-    labels = [one.change.term.label for one in seen]
-    later = sorted(seen, key=lambda one: one.change.k, reverse=True)
-    waiting = {label: [o for o in later if o.change.term.label == label] for label in labels}
-    for label in labels:
-        yield waiting[label].pop()
-
-
 def _ends(begun: Change, ended: Change) -> bool:
     same = begun.term.label == ended.term.label and begun.trend.kind == ended.trend.kind == "drift"
     if not same or begun.k >= ended.k:
@@ -97,25 +92,48 @@ def _went_back(changes: Changes, told: Taken, first: int) -> Seen:
     each = np.logaddexp.reduce(changes.gains(look), axis=0)
     others = tuple((changes.terms[i], float(each[one.effect] - each[i])) for i in np.argsort(-each)
                    if i != one.effect and each[i] > each[one.effect] - RIVAL_NATS)  # fmt: skip
-    return _dated(changes, look, told, best, first, others)
+    table = changes.likelihoods(look)[:, one.effect]
+    near = [(changes.change(look, row, one.effect), share) for row, share in _credible(table)]
+    return _dated(near, look, told, best, first, others)
 
 
 def _seen(
     changes: Changes, told: Sequence[Taken], k: int, fitted: Sequence[Change], first: int
 ) -> Seen:
-    """One of several, the others taken off and what is left of them free."""
-    rest = changes
-    for at, other in enumerate(fitted):
-        if at != k:
-            rest = rest.taking(other)
-    count = changes.pool.count
-    rivals = possible_beside(changes, fitted, count).rivals([one.one for one in told], k)
-    others = tuple((changes.terms[i], worse) for i, worse in rivals)
-    return _dated(rest, count, told[k], fitted[k], first, others)
+    """One of several, the others free beside it."""
+    ones, count = [one.one for one in told], changes.pool.count
+    possible = possible_beside(changes, fitted, count).knowing(ones)
+    others = tuple((changes.terms[i], worse) for i, worse in possible.rivals(ones, k))
+    near = _near(possible, ones, k, fitted[k])
+    return _dated(near, count, told[k], fitted[k], first, others)
+
+
+def _near(
+    possible: PossibleChanges, ones: Sequence[PossibleChange], k: int, best: Change
+) -> list[tuple[Change, float]]:
+    """One of several with every trend that it may have, and how likely that is; the constants of
+    the runs and what differs in them are told without it, as its size is."""
+    rest, effect = [one for at, one in enumerate(ones) if at != k], ones[k].effect
+    known, table = possible.trends, possible.gains(rest)[:, effect]
+    table = np.where([one.until is None for one in known], table, -np.inf)
+    temper = np.trace(best.covariance) / np.trace(possible.values(ones)[k].covariance)
+    near = []
+    for row, share in _credible(table):
+        one = possible.values([*rest, PossibleChange(effect, known[row])])[-1]
+        near.append((replace(one, covariance=temper * one.covariance), share))
+    return near
+
+
+def _credible(table: Array) -> list[tuple[int, float]]:
+    """Rows by the logs of their odds, and their shares, as many as together are likely enough."""
+    share = np.exp(table - np.logaddexp.reduce(table))
+    order = np.argsort(-share)
+    needed = order[: int(np.searchsorted(np.cumsum(share[order]), CREDIBLE)) + 1]
+    return [(int(row), float(share[row])) for row in needed]
 
 
 def _dated(
-    changes: Changes,
+    near: Sequence[tuple[Change, float]],
     look: int,
     told: Taken,
     best: Change,
@@ -123,14 +141,8 @@ def _dated(
     others: tuple[tuple[Term, float], ...],
 ) -> Seen:
     """A change with the runs that may be its first."""
-    known, c = trends(look), told.one.effect
-    table = changes.likelihoods(look)[:, c]
-    share = np.exp(table - np.logaddexp.reduce(table))
-    order = np.argsort(-share)
-    needed = order[: int(np.searchsorted(np.cumsum(share[order]), CREDIBLE)) + 1]
-    near = [(changes.change(look, int(k), c), float(share[k])) for k in needed]
     same = [(one, own) for one, own in near if one.trend.kind == best.trend.kind]
-    firsts = [known[k].k for k in needed] + [best.k]
+    firsts = [one.k for one, _ in near] + [best.k]
     if best.trend.until is not None:  # trends that go on do not date one that ended
         firsts, near, same = [best.k], [], []
     return Seen(

@@ -45,7 +45,8 @@ MOST_TOLD: Final = 4  # effects of one run
 MOST_TRIED: Final = 4  # runs that seem odd before the scatter of the others is known
 PAIRED: Final = 3  # of them, of which two are looked at together
 FEWEST_OF_PAIRS: Final = 6  # runs
-SCATTER_KNOWN: Final = 8  # runs; before, an effect is taken to differ by APART from run to run
+SCATTER_KNOWN: Final = 8  # runs; before, an effect is taken to differ from run to run
+USUAL_BOUNDS: Final = 3.0  # of a run, by which it then is
 AS_GOOD_NATS: Final = 2.0
 RIVAL_NATS: Final = 3.0
 
@@ -166,7 +167,7 @@ def _held(changes: Changes, run: int, apart: tuple[int, ...]) -> Odd:
     inside = np.maximum(changes.inside(changes.pool.count), changes.within[run])
     known = Known(others, runs, normal[0], score[0])
     factor = np.array([between[t.label] for t in changes.terms])
-    doubt = 1.0 if changes.pool.count >= SCATTER_KNOWN else 1.0 + APART[-1] ** 2
+    doubt = 1.0 if changes.pool.count >= SCATTER_KNOWN else 1.0 + USUAL_BOUNDS**2
     tries = changes.pool.count ** (1 + len(apart))
     return Odd(changes, known, inside, inside * factor, tries, doubt)
 
@@ -203,10 +204,11 @@ class Known:
         found = [replace(self.alike, log_share=-total)]
         usual = self.runs.normal.mean(axis=0)
         more = 1.0 + 1.0 / len(self.runs.normal)  # the mean of the others is as uncertain by it
-        for term, own in zip(self.others.terms, odds, strict=True):
-            spread = more * inverted(usual[np.ix_(term.index, term.index)])
+        for part, own in zip(self.others.parts, odds, strict=True):
+            index = part.index
+            spread = more * inverted(usual[np.ix_(index, index)])
             for size, log_odds in zip(APART, own, strict=True):
-                freed = freed_of(self.normal[None], self.score[None], term.index, size**2 * spread)
+                freed = freed_of(self.normal[None], self.score[None], index, size**2 * spread)
                 one = self._own(*(each[0] for each in freed))
                 found.append(replace(one, log_share=float(log_odds) - total))
         return tuple(found)

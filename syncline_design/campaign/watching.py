@@ -190,7 +190,9 @@ class Watching:
             return StandingAlone((), ())
         changes = self.every.changes
         likely = changes.likeliest(len(self.ordered)) if len(self.ordered) > 1 else None
-        if likely is not None:
+        rather = changes.differs_rather(len(self.ordered)) if likely is not None else None
+        scatters = rather is not None and likely is not None and rather.term == likely.term
+        if likely is not None and not scatters:
             left = changes.without(likely)
             found = standing(left, strangers(left))
             if found.alone:

@@ -26,7 +26,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 AS_GOOD_NATS: Final = 2.0
-INSTEAD_NATS: Final = 3.0  # by which two in the place of one explain more
+INSTEAD_NATS: Final = 3.0  # by which two in the place of one, or of scatter, explain more
 MOST_CHANGES: Final = 8
 ROUNDS: Final = 2
 MOST_TRIED: Final = 60  # likeliest firsts of two that are tried in the place of one
@@ -55,6 +55,8 @@ def what_changed(changes: Changes, first: int, threshold: float) -> tuple[Taken,
         had.add(frozenset(found))
         state, at, only = _beside(changes, fitted), look, None
         total = state.log_evidence(at)[0]
+        if not found and total < threshold and (passed := _passed(changes, (), threshold)):
+            return passed
         if not found and total < threshold:  # an alarm stays, by what it rang with
             total = state.log_evidence(first)[0]
             at = look if changes.gains(look).max() >= threshold else first
@@ -69,7 +71,22 @@ def what_changed(changes: Changes, first: int, threshold: float) -> tuple[Taken,
             found = _held_against_others(changes, _fits(changes, fitted, found, look), found)
             evidence = [*evidence, *[total] * len(found)][: len(found)]
         fitted = _fits(changes, fitted, found, look)
-    return tuple(Taken(*pair) for pair in zip(found, evidence, strict=True))
+    taken = tuple(Taken(*pair) for pair in zip(found, evidence, strict=True))
+    return (*taken, *_passed(changes, fitted, threshold))[:MOST_CHANGES]
+
+
+def _passed(
+    changes: Changes, fitted: Sequence[Change], threshold: float
+) -> tuple[Taken, Taken] | tuple[()]:
+    """What some runs on end have besides what was found, or one run, and what undid it; nothing
+    where that may be scatter as well."""
+    look = changes.pool.count
+    one = changes.without(*fitted).passed(look)
+    if one is None or one.log_factor < threshold or one.trend.until is None:
+        return ()
+    place = [term.label for term in changes.terms].index(one.term.label)
+    begun, undone = (PossibleChange(place, Trend("step", k)) for k in (one.k, one.trend.until))
+    return Taken(begun, one.log_factor), Taken(undone, one.log_factor)
 
 
 def _beside(changes: Changes, fitted: Sequence[Change]) -> Changes:
@@ -120,24 +137,42 @@ def _held_against_others(
 
     Where a trend stands for two (a drift that ended), what it leaves looks like an effect that
     differs from run to run; free in every run, that would hide the two.  So they are tried without
-    it, and taken where nothing that differs is left.
+    it, and taken where nothing that differs is left and the runs are likelier so.
     """
     look = changes.pool.count
     usual = possible_beside(changes, fitted, look)
-    if usual.freed:
-        plain = refined(replace(usual, freed=()), found)
-        left = changes.without(*_fits(changes, fitted, plain, look))
-        if len(plain) <= len(found) + 1 and not left.compared(look).freed:
-            return plain
-    return refined(usual, found)
+    beside = refined(usual, found)
+    if not usual.freed:
+        return beside
+    plain = refined(replace(usual, freed=()), found)
+    fits = [_fits(changes, fitted, ones, look) for ones in (plain, beside)]
+    if len(plain) > len(found) + 1 or changes.without(*fits[0]).compared(look).freed:
+        return beside
+    sums = [_log_odds(usual, ones, fit) for ones, fit in zip((plain, beside), fits, strict=True)]
+    scatter = float(changes.without(*fits[1]).log_odds_of_any(look))
+    return plain if sums[0] > sums[1] + scatter + INSTEAD_NATS else beside
+
+
+def _log_odds(
+    possible: PossibleChanges, ones: Sequence[PossibleChange], fitted: Sequence[Change]
+) -> float:
+    """log of the odds of a set of changes against none where nothing differs from run to run, over
+    all their sizes; of a day and its trend the weight counts once."""
+    changes, noise = possible.changes, possible.noise
+    days = sum(possible.weight_of(trend) for trend in {one.trend for one in ones})
+    sizes = sum(changes.log_of_sizes(one, noise, possible.look) for one in fitted)
+    weights = sum(float(changes.log_weights[one.effect]) for one in ones)
+    return changes.explained(possible.look, fitted) / noise + sizes + weights + days
 
 
 def possible_beside(changes: Changes, fitted: Sequence[Change], look: int) -> PossibleChanges:
     """What could have changed; effects are free in every run that differ from one to the next where
-    what was found is taken off."""
+    what was found is taken off: clearly, or rather than that anything else changed."""
     left = changes.without(*fitted)
     needed = tuple(one.trend for one in fitted)
-    return PossibleChanges(changes, look, left.compared(look).freed, tuple(fitted), needed)
+    rather = left.differs_rather(look)
+    freed = (*left.compared(look).freed, *(() if rather is None else (rather,)))
+    return PossibleChanges(changes, look, freed, tuple(fitted), needed)
 
 
 def commonest(changes: Changes, known: Sequence[Trend], gains: Array) -> PossibleChange:
