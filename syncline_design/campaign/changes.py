@@ -63,8 +63,7 @@ from syncline_design.effects.record import Array
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
 DRIFT: Final = 1.0  # bounds of one run: the change from run to run of the drift that is looked for
 SIZES: Final = ((1.0, 0.7), (4.0, 0.3))  # times as large, and how often
-DIFFERS_NATS: Final = 1.0  # odds from which changes beside what differs are looked for, too
-FEWEST_PASSED: Final = 4  # runs
+DIFFERS_NATS: Final = 1.0  # odds from which something may differ, and changes beside it count
 
 
 class Changes(RunSums):
@@ -187,14 +186,20 @@ class Changes(RunSums):
         return log_of_sizes(one.values, noise * one.covariance, inverted(usual))
 
     def passed(self, look: int) -> Change | None:
-        """A change that went back, where it is likelier than what differs from run to run."""
-        if look < FEWEST_PASSED:
-            return None
+        """A change that went back, where over all its sizes it is likelier than what differs from
+        run to run, and leaves nothing that rather differs than not."""
         runs = self._compared(look, *with_beside(self.pool, look, self.beside))
         one = passing_change(self.parts, self.part_groups, runs.parts)
-        if one is None or one.log_factor <= self._log_odds(look, runs, self.parts).max():
+        if one is None:
             return None
-        return one
+        moved = np.flatnonzero(one.values)
+        own = one.values[moved], one.covariance[np.ix_(moved, moved)]
+        usual = runs.normal.mean(axis=0)[np.ix_(*2 * [one.term.index[moved]])]
+        log_factor = one.log_factor + len(moved) + log_of_sizes(*own, inverted(usual))
+        if log_factor <= self._log_odds(look, runs, self.parts).max():
+            return None
+        left = self._log_odds(look, runs, self.parts, one).max()
+        return None if left > DIFFERS_NATS else replace(one, log_factor=log_factor)
 
     def differs_rather(self, look: int) -> Differing | None:
         """What has another value in every run where that is likelier than any change is, whether
