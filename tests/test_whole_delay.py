@@ -11,7 +11,7 @@ from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_log import by_log
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.comparison.on_paper import OnPaper
-from syncline_design.comparison.whole_delay import whole_delay
+from syncline_design.comparison.whole_delay import Passing, whole_delay
 from syncline_design.diagnosis.result import Diagnosis, Finding
 from syncline_design.spec.load import load
 from tests.acceptance_samples import EXAMPLE, found_in_first_rows
@@ -88,3 +88,34 @@ def test_a_ramp_after_a_knee_is_a_drift_less_its_step(found: Diagnosis) -> None:
     assert row.status == "broken"
     assert row.measured is not None
     assert row.measured.value == pytest.approx(0.0388)
+
+
+def test_what_is_late_for_a_while_comes_on_top(found: Diagnosis) -> None:
+    """A constant and two whiles that overlap or not, at 20 001 instants."""
+    rng = np.random.default_rng(5)
+    duration_s = found.log.duration_s
+    time_s = np.linspace(0.0, duration_s, 20_001)
+    part = found.findings[0].parameters["latency_s"]
+    for _ in range(40):
+        constant, *late = rng.normal(size=3) * 0.03
+        spans = np.sort(rng.uniform(size=(2, 2))) * duration_s
+        delay = np.full(time_s.shape, constant)
+        passing = []
+        for value, (begin, end) in zip(late, spans, strict=True):
+            delay += value * ((time_s >= begin) & (time_s <= end))
+            told_as = replace(
+                part, value=value, interval95=tuple(sorted((0.9 * value, 1.1 * value)))
+            )
+            passing.append(Passing(told_as, float(begin), float(end)))
+        alone = replace(found, findings=(finding(found, "latency", latency_s=constant),))
+        figure = whole_delay(ONE, alone, passing)
+        assert figure is not None
+        assert figure.value == pytest.approx(delay[np.argmax(np.abs(delay))], abs=1e-9)
+        assert figure.low is not None
+        assert figure.high is not None
+        assert figure.low <= figure.value <= figure.high
+
+
+def test_a_constant_alone_is_no_sum(found: Diagnosis) -> None:
+    alone = replace(found, findings=(finding(found, "latency", latency_s=0.02),))
+    assert whole_delay(ONE, alone) is None

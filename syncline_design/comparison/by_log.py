@@ -77,8 +77,9 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
         said = as_bound(one, said, breaking, log)
         if one.name == "noise":  # how far it scatters is not what constants and drifts hide
             return replace(said, words=_with_more(said, undone))
+        said = _in_all(one, said, log) or said
         said = _but_for(said, undone, log.parts.room_undone(one), _is_signed(one))
-        said = with_scatter(one, _in_all(one, said, log) or said, log)
+        said = with_scatter(one, said, log)
         return beside_shapes(one, _or_more(one, said, log), log, signed=_is_signed(one))
     moved = [each for each in shifts(one, log.found) if log.is_sure(one, each.finding)]
     shifted = by_shifts(one, moved, log.paper)
@@ -103,7 +104,8 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
 def _in_all(one: Assumed, said: Judgement | None, log: LogEvidence) -> Judgement | None:
     """What is said of a delay, with what adds to it, as far as all of that is sure."""
     sure = all(log.is_sure(one, f) for f in delaying(one, log.found))
-    return with_all_delays(one, said, log.found, log.paper) if sure else said
+    passing = list(log.parts.late(one, log.began_s)) if one.name == "latency" else []
+    return with_all_delays(one, said, log.found, log.paper, passing) if sure else said
 
 
 def _suspect(one: Assumed, log: LogEvidence) -> Judgement | None:

@@ -13,12 +13,13 @@ from syncline_design.comparison.in_doubt import InDoubt, OneWay
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.late_together import others_late
 from syncline_design.comparison.on_paper import OnPaper
+from syncline_design.comparison.whole_delay import Passing
 from syncline_design.diagnosis.consequence import SHARE
 from syncline_design.diagnosis.result import Smallest
 from syncline_design.diagnosis.stretches import OtherFit, ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.diagnosis.unlike_readings import factor_effect
-from syncline_design.effects import registry
+from syncline_design.effects import plain_delay, registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
 from syncline_design.model.normal import NEARLY_ALL, NORMAL_95
@@ -54,6 +55,14 @@ class InStretches:
         if not broken:
             return said[0] if said else None
         return replace(broken[0], words="; ".join(j.words for j in broken))
+
+    def late(self, one: Assumed, began_s: float) -> Iterator[Passing]:
+        """Delays of the sensor that are its own beyond doubt, on top of what acts all along."""
+        for s in self.found.stands:
+            said = self._of(s, one)
+            if said is not None and said.status == "broken" and s.label[0] == plain_delay().name:
+                (delay,) = of_stretch(s).parameters.values()
+                yield Passing(delay, s.from_s - began_s, s.to_s - began_s)
 
     def in_doubt(self) -> Iterator[InDoubt]:
         """What stands out beyond doubt beside what fits as well; all of it turns the verdict."""

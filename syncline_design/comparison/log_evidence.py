@@ -68,6 +68,11 @@ class LogEvidence:
         return InStretches(self.paper, self.is_of, read.duration_s, seen.stretches, seen.open,
                            read.kind)  # fmt: skip
 
+    @property
+    def began_s(self) -> float:
+        """Stamp of its first row."""
+        return 0.0 if self.sight is None or self.sight.ends_s is None else self.sight.ends_s[0]
+
     def others_of(self, finding: Finding) -> tuple[tuple[str, str, str], ...]:
         """What together would do in a finding's place: effect, sensor and stage of each."""
         own = (finding.effect, finding.sensor, finding.stage)

@@ -1,13 +1,15 @@
-"""The largest delay of a sensor on a log, of a constant one and what its stamps do together.
+"""The largest delay of a sensor on a log, of a constant one, what its stamps do, and what is late
+for a while or in some rows, together.
 
-    delay(t) = L + r t + s [t >= t*],   t from the log's start to its end,
+    delay(t) = L + r t + s [t >= t*] + sum_k d_k [a_k <= t <= b_k],   t from the log's start,
 is linear between its steps, so that the largest is at the start, at the end or beside a step.  An
 interval holds the sum of the ends of its parts' intervals, however these vary together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from syncline_design.comparison.acceptance import MeasuredFigure
@@ -22,12 +24,22 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)
+class Passing:
+    """A delay that acts from one time from the log's start to another, or in some rows between."""
+
+    delay: Estimate
+    from_s: float
+    to_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class _Part:
-    """A figure, how it counts with the time from the start, and from when on it does."""
+    """A figure, how it counts with the time from the start, and from when on and until it does."""
 
     figure: Estimate
     grows: bool = False
     from_s: float = 0.0
+    to_s: float = math.inf
 
     def at(self, time_s: float) -> tuple[float, float | None, float | None]:
         """Value and ends of its interval after so much time."""
@@ -38,13 +50,18 @@ class _Part:
 
 
 def with_all_delays(
-    one: Assumed, said: Judgement | None, found: Diagnosis, paper: OnPaper
+    one: Assumed,
+    said: Judgement | None,
+    found: Diagnosis,
+    paper: OnPaper,
+    passing: Sequence[Passing] = (),
 ) -> Judgement | None:
-    """What is said of a delay, of the largest that a constant and its stamps make together.
+    """What is said of a delay, of the largest that a constant, its stamps and what passes make
+    together.
 
     It is broken where these together turn the verdict.
     """
-    figure = whole_delay(one, found)
+    figure = whole_delay(one, found, passing)
     if figure is None or figure.value is None or not delay_turns(one, figure, paper):
         return said
     whole = f"in all a delay of up to {amount(figure.value, 's')} on this log"
@@ -55,20 +72,25 @@ def with_all_delays(
     return replace(said, words=f"{said.words}; {whole}", measured=figure)
 
 
-def whole_delay(one: Assumed, found: Diagnosis) -> MeasuredFigure | None:
-    """The largest; None where at most one finding makes it, or none of them moves the stamps."""
-    parts = list(_parts(one, found))
-    if len(parts) < 2 or not any(part.grows or part.from_s > 0.0 for part in parts):
+def whole_delay(
+    one: Assumed, found: Diagnosis, passing: Sequence[Passing] = ()
+) -> MeasuredFigure | None:
+    """The largest; None where at most one makes it, or none of them moves the stamps or passes."""
+    lasting = list(_parts(one, found))
+    parts = lasting + [_Part(p.delay, False, p.from_s, p.to_s) for p in passing]
+    moves = any(part.grows or part.from_s > 0.0 for part in lasting)
+    if not lasting or len(parts) < 2 or not (moves or passing):
         return None
     duration_s = found.log.duration_s
-    steps_s = [p.from_s for p in parts if 0.0 < p.from_s < duration_s]
+    edges = (edge for p in parts for edge in (p.from_s, p.to_s))
+    steps_s = [edge for edge in edges if 0.0 < edge < duration_s]
     sums = [_sum(parts, time_s) for time_s in (0.0, duration_s, *steps_s)]
     sums += [_sum([p for p in parts if p.from_s < time_s], time_s) for time_s in steps_s]
     return max(sums, key=lambda figure: abs(figure.value or 0.0))
 
 
 def _sum(parts: list[_Part], time_s: float) -> MeasuredFigure:
-    told = [p.at(time_s) for p in parts if p.from_s <= time_s]
+    told = [p.at(time_s) for p in parts if p.from_s <= time_s <= p.to_s]
     lows, highs = [low for _, low, _ in told], [high for *_, high in told]
     value = sum(v for v, *_ in told)
     if None in lows or None in highs:
