@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Final
 
 from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.looks import KeptLook, keys_of, known_first
@@ -13,11 +12,6 @@ from syncline_design.campaign.seen import Seen, seen_changes
 from syncline_design.campaign.store import Entry, Stored, by_date
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
-
-AS_GOOD_NATS: Final = 2.0
-RIVAL_NATS: Final = 3.0
-MOST_CHANGES: Final = 4
-CREDIBLE: Final = 0.95
 
 
 @dataclass(frozen=True, eq=False)

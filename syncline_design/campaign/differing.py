@@ -12,13 +12,12 @@ from syncline_design.campaign.parts import EffectPart
 from syncline_design.campaign.pool import inverted
 from syncline_design.campaign.run_records import Differing, SameSize
 from syncline_design.campaign.scatter import RunScatter
-from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.candidates import AS_GOOD_NATS, commonness
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 SCATTERED: Final = 3.0  # standard deviations of Q beyond which runs clearly differ
-AS_GOOD_NATS: Final = 2.0  # within which the commoner of two that differ is named
 MOSTLY: Final = 0.8  # of what one differs by that another would explain in its place
 MOST_OTHERS: Final = 3
 MOST_SCATTERED: Final = 2  # effects that are freed in every run

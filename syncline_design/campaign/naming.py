@@ -22,7 +22,7 @@ import numpy as np
 from syncline_design.campaign.constants import ANOTHER
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.campaign.tries import tries_of
-from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.candidates import AS_GOOD_NATS, commonness
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.result import Scope
 from syncline_design.diagnosis.scores import log_p_of
@@ -31,7 +31,6 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import chi_square_beyond
 
 LEAST_GAIN: Final = 3.0  # nat, below which a candidate is not looked at
-AS_GOOD_NATS: Final = 2.0  # within which the commoner of two effects is named
 RIVAL_NATS: Final = 3.0  # a rival that fits worse by less than this is not excluded by the data
 RIVAL_COSINE: Final = 0.7  # ... where it looks at least so much alike
 SHARE: Final = {"build": 0.8, "start": 0.1, "log": 0.1}  # of the false alarms, by scope

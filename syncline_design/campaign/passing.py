@@ -22,10 +22,9 @@ from syncline_design.campaign.pool import Index, inverted
 from syncline_design.campaign.run_records import Change, SameSize
 from syncline_design.campaign.scatter import EffectInRuns, RunScatter, explained
 from syncline_design.campaign.trends import Trend
-from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.candidates import AS_GOOD_NATS, commonness
 from syncline_design.effects.record import Array
 
-AS_GOOD_NATS: Final = 2.0
 FEWEST_OTHERS: Final = 3  # runs beside the one that is odd
 
 

@@ -33,7 +33,7 @@ from syncline_design.campaign.freed_runs import pseudo_inverse
 from syncline_design.campaign.pool import Index, Term, inverted
 from syncline_design.campaign.run_records import Runs
 from syncline_design.campaign.scatter import APART, freed_of
-from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.candidates import AS_GOOD_NATS, commonness
 from syncline_design.diagnosis.judged import Judged, log_f
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.record import Array
@@ -47,7 +47,6 @@ PAIRED: Final = 3  # of them, of which two are looked at together
 FEWEST_OF_PAIRS: Final = 6  # runs
 SCATTER_KNOWN: Final = 8  # runs; before, an effect is taken to differ from run to run
 USUAL_BOUNDS: Final = 3.0  # of a run, by which it then is
-AS_GOOD_NATS: Final = 2.0
 RIVAL_NATS: Final = 3.0
 
 

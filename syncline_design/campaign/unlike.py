@@ -17,14 +17,13 @@ import numpy as np
 
 from syncline_design.campaign.naming import ratio
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
-from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.candidates import AS_GOOD_NATS, commonness
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.machine.quick_dataclass import dataclass
 
 RATE: Final = 0.01  # chance that any of several alike logs is said to be unlike
 FEWEST: Final = 3  # logs: of two that differ neither is the odd one
-AS_GOOD_NATS: Final = 2.0
 LEAST_GAIN: Final = 3.0  # nat, below which no chance is worked out
 
 

@@ -21,11 +21,10 @@ from syncline_design.campaign.changes import Changes
 from syncline_design.campaign.possible_changes import PossibleChange, PossibleChanges
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.trends import Trend, trends
-from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.candidates import AS_GOOD_NATS, commonness
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
-AS_GOOD_NATS: Final = 2.0
 INSTEAD_NATS: Final = 3.0  # by which two in the place of one, or of scatter, explain more
 MOST_CHANGES: Final = 8
 ROUNDS: Final = 2

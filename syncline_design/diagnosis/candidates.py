@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field
+from typing import Final
 
 import numpy as np
 
@@ -20,6 +21,7 @@ STEP_TIMES = 30  # places along the log where a step is looked for at first
 MEMORIES_S = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # time constants whose shape is looked for as it is
 LEAST_MEMORY = 2.0  # stamps
 STEP = 1e-4  # of a value, by which it is moved for a slope: far below what bends, above rounding
+AS_GOOD_NATS: Final = 2.0  # within which the commoner of two effects is named
 EDGE = 0.03  # share of the rows at either end where a step is not looked for: too few tell it
 
 

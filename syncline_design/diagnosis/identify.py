@@ -12,7 +12,13 @@ from dataclasses import field, replace
 
 import numpy as np
 
-from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, slopes
+from syncline_design.diagnosis.candidates import (
+    AS_GOOD_NATS,
+    Candidate,
+    Signature,
+    commonness,
+    slopes,
+)
 from syncline_design.diagnosis.charges import Charge, charge, fitted_figures
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
 from syncline_design.diagnosis.identity import Label, effect_of, without
@@ -28,7 +34,6 @@ CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
 MOST_REFITTED = 8
 RIVAL_COSINE = 0.7  # from which a rival that fits as well is said not to be told apart
 RIVAL_NATS = 3.0  # a rival that fits worse by less than this is not excluded by the data
-AS_GOOD_NATS = 2.0  # within which the commoner of two effects is named
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ from syncline_design.diagnosis.candidates import (
     signature,
 )
 from syncline_design.diagnosis.judged import log_f
-from syncline_design.diagnosis.late_rows import Late, acting_late
+from syncline_design.diagnosis.late_rows import AS_GOOD_NATS, Late, acting_late
 from syncline_design.diagnosis.looked_up import Index, Mask, Weighed
 from syncline_design.diagnosis.reading_parts import readings_late
 from syncline_design.diagnosis.scene import Scene
@@ -45,7 +45,6 @@ from syncline_design.model.distributions import chi_square_limit, student_limit
 from syncline_design.model.normal import NORMAL_95
 
 CLEARLY_NATS: Final = 15.0  # by which two delays have to be likelier than any
-AS_GOOD_NATS: Final = 4.5  # within which another device fits as well
 APART: Final = 1.0  # standard deviations of the median row, between the two
 NEARLY_APART: Final = 0.7  # before all of the motion is asked
 LOUDEST: Final = 2.0  # times the spec's noise, that the two may leave

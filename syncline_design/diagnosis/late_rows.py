@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from syncline_design.diagnosis.looked_up import Index
 from syncline_design.effects import plain_delay
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import ActsOn, Array
 from syncline_design.machine.quick_dataclass import dataclass
+
+AS_GOOD_NATS: Final = 4.5  # within which another device fits as well
 
 
 @dataclass(frozen=True, slots=True)

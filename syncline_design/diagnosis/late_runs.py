@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.in_turn import in_turn, than_the_others
-from syncline_design.diagnosis.late_rows import Late, acting_late
+from syncline_design.diagnosis.late_rows import AS_GOOD_NATS, Late, acting_late
 from syncline_design.diagnosis.looked_up import (
     LEAST_ROWS,
     LateRows,
@@ -50,7 +50,6 @@ MOST_GROWN_S: Final = 2.0
 NEAR_S: Final = 1e-3  # to either side, over which errors are straight lines in a delay
 POLISHED: Final = 4  # steps
 CHANCE: Final = 1e-4  # that noise is louder than what is taken for noise
-AS_GOOD_NATS: Final = 4.5  # within which another device fits as well
 BETTER_NATS: Final = 5.0  # by which a single row has to be late rather than sound
 WIDENED: Final = 3  # times that rows are added to those that are late
 _Told = tuple[Array, Array]  # delays and their spreads

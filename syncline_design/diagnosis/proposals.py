@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from syncline_design.diagnosis.candidates import (
+    AS_GOOD_NATS,
     STEP_TIMES,
     Candidate,
     Signature,
@@ -52,7 +53,6 @@ WANDER_NATS = (
     15.0  # slow noise can take the shape of anything slow, so it has to be that much better
 )
 TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
-AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 PAIRS = 8  # effects two by two that are judged by slow states, the likeliest ones
 
 Label = tuple[str, str, int]
