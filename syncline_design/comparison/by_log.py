@@ -23,7 +23,7 @@ from syncline_design.comparison.by_noise import (
 from syncline_design.comparison.by_scatter import as_bound, with_scatter
 from syncline_design.comparison.by_shift import by_shifts, shifts, widened
 from syncline_design.comparison.by_stretch import SPOKEN_OF
-from syncline_design.comparison.departing import amount, figure_of
+from syncline_design.comparison.departing import amount, figure_of, with_room
 from syncline_design.comparison.in_doubt import (
     InDoubt,
     Suspicion,
@@ -104,7 +104,7 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
 def _in_all(one: Assumed, said: Judgement | None, log: LogEvidence) -> Judgement | None:
     """What is said of a delay, with what adds to it, as far as all of that is sure."""
     sure = all(log.is_sure(one, f) for f in delaying(one, log.found))
-    passing = list(log.parts.late(one, log.began_s)) if one.name == "latency" else []
+    passing = list(log.parts.late(one, log.began_s))
     return with_all_delays(one, said, log.found, log.paper, passing) if sure else said
 
 
@@ -182,10 +182,8 @@ def _with_room(figure: MeasuredFigure | None, room: float, signed: bool) -> Meas
     value = figure.value or 0.0
     if room <= 0.0:
         return MeasuredFigure(value)
-    low, high = value - room, value + room
-    if figure.low is not None and figure.high is not None:
-        low, high = min(low, figure.low), max(high, figure.high)
-    return MeasuredFigure(value, low if signed else max(low, 0.0), high)
+    wide = with_room(figure, value, room)
+    return wide if signed else MeasuredFigure(value, max(wide.low or 0.0, 0.0), wide.high)
 
 
 def _sensors(finding: Finding) -> tuple[str, ...]:

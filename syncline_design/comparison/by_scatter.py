@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
-from syncline_design.comparison.departing import amount
+from syncline_design.comparison.departing import amount, with_room
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.diagnosis.result import Finding
@@ -41,11 +41,8 @@ def with_scatter(one: Assumed, said: Judgement, log: LogEvidence) -> Judgement:
     figure = said.measured
     if one.name != "latency" or not room > 0.0 or figure is None or figure.value is None:
         return said
-    low, high = figure.value - room, figure.value + room
-    if figure.low is not None and figure.high is not None:
-        low, high = min(low, figure.low), max(high, figure.high)
     words = f"{said.words}; it is a mean, and differs from row to row by up to {amount(room, 's')}"
-    return replace(said, words=words, measured=MeasuredFigure(figure.value, low, high))
+    return replace(said, words=words, measured=with_room(figure, figure.value, room))
 
 
 def _rooms(one: Assumed, log: LogEvidence) -> Iterator[float]:

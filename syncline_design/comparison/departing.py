@@ -43,6 +43,14 @@ class Departing:
                 yield float(one.value), one.unit
 
 
+def with_room(figure: MeasuredFigure, value: float, room: float) -> MeasuredFigure:
+    """The figure with an interval of at least `room` on either side of its value."""
+    low, high = value - room, value + room
+    if figure.low is not None and figure.high is not None:
+        low, high = min(low, figure.low), max(high, figure.high)
+    return MeasuredFigure(value, low, high)
+
+
 def of_finding(one: Finding) -> Departing:
     """What a diagnosis found, in all sensors that share it."""
     return Departing(one.effect, (one.sensor, *(one.also or ())), one.stage, one.parameters)
