@@ -43,7 +43,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.differing import clearly_differing, may_be_freed
-from syncline_design.campaign.differing_odds import likeliest_of, log_of_sizes
+from syncline_design.campaign.differing_odds import likeliest_of, log_of_any, log_of_sizes
 from syncline_design.campaign.freed_runs import (
     freed_by_trends,
     pseudo_inverse,
@@ -96,7 +96,7 @@ class Changes(RunSums):
             own = freed_of(runs.normal, runs.score, one.term.index, one.covariance)
             more = beside(self._compared(look, *own))
             alike = float(np.logaddexp(alike, odds.max() + more))
-        return alike - float(np.logaddexp.reduce([0.0, *odds.ravel()]))
+        return alike - log_of_any(odds)
 
     def _summed(self, look: int, table: Array) -> float:
         return float(np.logaddexp.reduce([*table.ravel(), math.log(later(look + 1))]))
@@ -152,7 +152,7 @@ class Changes(RunSums):
     def doubt(self, look: int) -> float:
         """log (1 + sum p_a L_a): how much likelier the first runs are where some effect may differ
         from run to run than where none does."""
-        return float(np.logaddexp.reduce([0.0, *self.log_odds(look).ravel()]))
+        return log_of_any(self.log_odds(look))
 
     def log_odds(self, look: int) -> Array:
         """log p_a L_a of every part, by each of APART, (U, S)."""
@@ -161,7 +161,7 @@ class Changes(RunSums):
     def log_odds_of_any(self, look: int) -> float:
         """log of the odds that some part differs by one of APART, clearly or not, against none."""
         runs = self._compared(look, *with_beside(self.pool, look, self.beside))
-        return float(np.logaddexp.reduce([0.0, *self._log_odds(look, runs, self.parts).ravel()]))
+        return log_of_any(self._log_odds(look, runs, self.parts))
 
     def explained(self, look: int, ones: Sequence[Change]) -> float:
         """How much likelier [nat] runs are with changes than without, by the noise fitted, with one

@@ -32,6 +32,11 @@ def log_odds_of(
     return np.asarray(found + log_odds_apart(len(inside)))
 
 
+def log_of_any(odds: Array) -> float:
+    """log (1 + sum p_a L_a): that some part differs, or none does."""
+    return float(np.logaddexp.reduce([0.0, *odds.ravel()]))
+
+
 def likeliest_of(runs: Runs, parts: Sequence[EffectPart], odds: Array) -> Differing:
     """The part that most likely differs from run to run, by the likeliest of APART."""
     k, size = np.unravel_index(int(np.argmax(odds)), odds.shape)

@@ -33,10 +33,6 @@ class EffectPart:
         return self.term.index[self.own]
 
     @property
-    def size(self) -> int:
-        return int(self.own.size)
-
-    @property
     def log_share(self) -> float:
         return math.log(self.share)
 

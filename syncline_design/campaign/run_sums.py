@@ -82,7 +82,7 @@ class RunSums:
         return np.asarray(np.maximum(1.0, self.within[:look].mean(axis=0)))
 
     def _log_odds(self, look: int, runs: Runs, parts: Sequence[EffectPart], *off: Change) -> Array:
-        """The same of some parts, of runs less what changes make."""
+        """log p_a L_a of some parts by each of APART, (U, S), of runs less what changes make."""
         return log_odds_of(runs, parts, self.inside(look), off)
 
     def _compared(self, look: int, normal: Array, score: Array, *likely: Change) -> Runs:

@@ -148,7 +148,7 @@ def _held_against_others(
     if len(plain) > len(found) + 1 or changes.without(*fits[0]).compared(look).freed:
         return beside
     sums = [_log_odds(usual, ones, fit) for ones, fit in zip((plain, beside), fits, strict=True)]
-    scatter = float(changes.without(*fits[1]).log_odds_of_any(look))
+    scatter = changes.without(*fits[1]).log_odds_of_any(look)
     return plain if sums[0] > sums[1] + scatter + INSTEAD_NATS else beside
 
 
