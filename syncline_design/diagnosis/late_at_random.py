@@ -54,9 +54,11 @@ LEAST_RUNS: Final = 5  # of late rows: fewer are whiles that come and go
 MOST_RUNS: Final = 200
 LEAST_S, MOST_S = 2e-3, 2.0  # of a delay
 ASIDE: Final = 0.1  # of a row's square over noise, from which it is left out
-BLOCKS: Final = 16
-STEPS, TIMES = 60, 12
-NEAR_S: Final = 1e-3
+BLOCKS: Final = 16  # stretches that are left out, one after the other
+STEPS, TIMES = 60, 12  # of expectation and maximization by slopes, and by all of the motion
+REWEIGHTED: Final = 5  # times that rows far off are made to count less
+NEAR_S: Final = 1e-3  # by which a delay is moved for a slope
+# quantiles of the rows' own delays that the two start from
 ENDS: Final = ((0.1, 0.9), (0.02, 0.6), (0.4, 0.98), (0.25, 0.97), (0.03, 0.75))
 
 
@@ -64,9 +66,9 @@ ENDS: Final = ((0.1, 0.9), (0.02, 0.6), (0.4, 0.98), (0.25, 0.97), (0.03, 0.75))
 class _Asked:
     """A log of one vehicle (n rows, those that count) and a device of it.
 
-    columns (n, 3, P): whitened, of what else a build can be wrong by, delays: which of them are
-    delays of other devices; along (n, 3): a_i.  louder: variance of what is taken for noise in
-    `root`, over the spec's.
+    columns (n, 3, P): whitened, of what else a build can be wrong by, in units of BUILD; delays:
+    which of them are delays of other devices; along (n, 3): a_i [1/s].  louder: variance of
+    what is taken for noise in `root`, over the spec's.
     """
 
     view: Scene
@@ -135,7 +137,7 @@ class _Asked:
         left, weight = self.left(0.0), self.counts.astype(float)
         every = self._with_own()
         values = np.zeros(every.shape[2])
-        for _ in range(STEPS // TIMES):
+        for _ in range(REWEIGHTED):
             values = _solved(every, left, weight)
             size = np.linalg.norm(left - every @ values, axis=1)
             usual = 2.0 * float(np.median(size[self.counts]))

@@ -27,11 +27,11 @@ from syncline_design.diagnosis.fitting import inner
 from syncline_design.diagnosis.frozen_channels import euler_rates
 from syncline_design.diagnosis.gross import Gross, expected_size, usual_size
 from syncline_design.diagnosis.judged import log_f
-from syncline_design.diagnosis.looked_up import Weighed
+from syncline_design.diagnosis.late_rows import acting_late
+from syncline_design.diagnosis.looked_up import Mask, Weighed
 from syncline_design.diagnosis.reading_parts import (
     PARTS,
     WHOLES,
-    Mask,
     ReadingPart,
     put_back,
     readings_late,
@@ -81,8 +81,7 @@ def late_part(inputs: Measured, log: Log, few: Log, exclude: Sequence[str] = ())
     if looking is None or told is None:
         return None
     part, delay_s, spread_s = told
-    delay = plain_delay()
-    acting = Acting(delay, part.sensor, 0, {delay.parameters[0].name: delay_s})
+    acting = acting_late(part.sensor, delay_s)
     back, known_rows = put_back(log, part, delay_s)
     after = looking.left(part, delay_s)
     falls_by = usual_size(looking.view.error()) / max(usual_size(after), 1e-300)
@@ -135,7 +134,7 @@ class _Sums:
 
 @dataclass(frozen=True, slots=True)
 class _Looking:
-    """A log, what else it may be off by (n, 3, P) in units of a build, and what angles do.
+    """A log, what else it may be off by (n, 3, P) in units of a build, and what readings do.
 
     swept (n, 3, 6): what a second of delay of every reading does (`readings_late`).
     whose: of each column of X the sensor that it delays; "" of one that is no delay.
@@ -180,7 +179,7 @@ class _Looking:
         )  # fmt: skip
 
     def left(self, part: ReadingPart, delay_s: float) -> Array:
-        """The error (n, 3) with some angles put back; as it was where that is not known."""
+        """The error (n, 3) [m] with some readings put back; as it was where that is not known."""
         return self._put_back(part, delay_s)[0]
 
     def _put_back(self, part: ReadingPart, delay_s: float) -> tuple[Array, Mask]:
@@ -188,7 +187,7 @@ class _Looking:
         return scene(self.system, log, self.view.known).error(), found
 
     def clearest(self) -> tuple[ReadingPart, float, float] | None:
-        """The angles that are late alone, by how much, and its standard uncertainty."""
+        """The readings that are late alone, by how much [s], and its standard uncertainty."""
         start = self._sums(self.view.error(), np.ones(len(self.view), bool))
         single = [part for part in PARTS if len(part.readings) == 1]
         if not any(self._differs(start, part) for part in single):
@@ -206,20 +205,20 @@ class _Looking:
         return self._judged(best, delay_s)
 
     def _differs(self, sums: _Sums, part: ReadingPart) -> bool:
-        """Whether angles are late by something else than the whole attitude is, by the
+        """Whether readings are late by something else than the whole device is, by the
         variance of leaving out one stretch after the other."""
-        value, spread = self._of_group(sums, part, ALL_FREE)
+        value, spread = self._of_part(sums, part, ALL_FREE)
         share = (value / max(spread, 1e-300)) ** 2
         return log_f(share, 1, BLOCKS - 1) < math.log(CHANCE / len(PARTS))
 
     def _fitted(self, part: ReadingPart) -> float | None:
-        """The delay of some angles that leaves least, without one of the whole attitude."""
+        """The delay [s] of some readings that leaves least, without one of the whole device."""
         delay_s = 0.0
         for _ in range(STEPS):
             error, found = self._put_back(part, delay_s)
             if np.mean(found) < 0.5:
                 return None
-            value, spread = self._of_group(self._sums(error, found), part)
+            value, spread = self._of_part(self._sums(error, found), part)
             delay_s += value
             if not abs(delay_s) <= MOST_S:
                 return None
@@ -229,7 +228,7 @@ class _Looking:
 
     def _judged(self, part: ReadingPart, delay_s: float) -> tuple[ReadingPart, float, float]:
         error, found = self._put_back(part, delay_s)
-        value, spread = self._of_group(self._sums(error, found), part)
+        value, spread = self._of_part(self._sums(error, found), part)
         reach = student_limit(0.025, BLOCKS - 1) / NORMAL_95
         return part, delay_s + value, reach * spread
 
@@ -237,10 +236,10 @@ class _Looking:
         """Columns that are no delays, and the delays of some sensors."""
         return [k for k, sensor in enumerate(self.whose) if not sensor or sensor in late]
 
-    def _of_group(
+    def _of_part(
         self, sums: _Sums, part: ReadingPart, late: Sequence[str] = ()
     ) -> tuple[float, float]:
-        """The delay [s] of some angles beside all else, and its standard uncertainty.
+        """The delay [s] of some readings beside all else, and its standard uncertainty.
 
         late: whole sensors that may be as well.
         """

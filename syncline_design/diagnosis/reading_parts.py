@@ -7,11 +7,10 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from syncline_design.diagnosis.candidates import Candidate, signature
 from syncline_design.diagnosis.frozen_channels import euler_rates
-from syncline_design.diagnosis.looked_up import vector_of
+from syncline_design.diagnosis.looked_up import Mask, vector_of
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import plain_delay
 from syncline_design.effects.kinematics import euler_to_rotation, rotate
@@ -20,8 +19,7 @@ from syncline_design.logs.log import GAP_FACTOR, Log
 from syncline_design.logs.stamps import per_stamp, usual_step_s
 from syncline_design.machine.quick_dataclass import dataclass
 
-STEP_RAD: Final = 1e-5
-Mask = NDArray[np.bool_]
+STEP_RAD: Final = 1e-5  # by which an angle is moved for a slope
 
 
 @dataclass(frozen=True, slots=True)

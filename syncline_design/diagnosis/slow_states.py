@@ -211,7 +211,7 @@ class States:
         return Weighted(tuple(axes), root, part, error, weight / scale2, prior)
 
     def _sizing(self, level: NoiseLevel) -> Sizing:
-        """Where a channel's variance may be at most the log's own noise, over the spec's."""
+        """The courses, and the most that the variance of a channel may be, over the spec's."""
         structure = self.data.structure
         most: dict[SensorKey, float] = {SURVEY: 1.0} | {
             w.sensor: max(x, 1.0) ** 2 for w, x in zip(structure.white, level.factor, strict=True)

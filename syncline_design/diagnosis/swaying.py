@@ -48,6 +48,7 @@ def largest_delays(data: Data, model: Model) -> Mapping[str, LargestDelay]:
     variance of the delays, that of the row is v a_i' r_i / (1 + v w_i), w_i = a_i' a_i, but for a
     standard deviation of sqrt(v / (1 + v w_i)); of rows that tell it by themselves (v w_i > 4) it
     is a_i' r_i / w_i, as delays are no normal ones.  The lower end pays for the number of rows.
+    Source: Robinson, Statistical Science 6 (1991), best linear unbiased prediction.
     """
     level, structure = model.level, data.structure
     alone = replace(level, size=tuple(0.0 for _ in level.size))
