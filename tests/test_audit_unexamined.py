@@ -95,7 +95,7 @@ def test_a_cloud_says_nothing_of_its_stamps(tmp_path: Path) -> None:
     assert found.exit_code == 2
     assert "order of space" in data["unexamined"][0]["reason"]
     text = CliRunner().invoke(app, ["audit", str(tmp_path / "cloud.las")])
-    assert "Files of which nothing was examined" in text.stdout
+    assert "What was not examined" in text.stdout
     assert "damaged" not in text.stdout
 
 

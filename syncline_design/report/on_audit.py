@@ -89,7 +89,7 @@ def on_audit(result: Audit) -> Document:
         sections=(
             *section("incomplete", "Files that are damaged",
                      _files("Damaged", (*result.damaged, *result.unreadable)), "Damaged"),
-            *section("unexamined", "Files of which nothing was examined",
+            *section("unexamined", "What was not examined",
                      _files("Not examined", result.unexamined), "Not examined"),
             *section("faults", "Faults by stream", list(_faults(result)), "Faults"),
             *section("left", "What is left once every named fault is out",
