@@ -25,6 +25,37 @@ from watched_series import (
 )
 
 
+def _density(covariance: np.ndarray, values: np.ndarray) -> float:
+    """log N(0, covariance) of the values of all runs, both in bounds."""
+    unit = np.tile(BOUND, len(values) // len(BOUND))
+    scaled = covariance / unit[:, None] / unit
+    return float(multivariate_normal(np.zeros(len(values)), scaled).logpdf(values / unit))
+
+
+def _changed(
+    changes: Changes, values: np.ndarray, under: np.ndarray, told: np.ndarray
+) -> dict[tuple[int, int], float]:
+    """log w_k w_c B_ck of every course and effect; told: information (6, P, P) of the runs."""
+    p, base = len(LABELS), _density(under, values)
+    found = {}
+    for c, term in enumerate(changes.terms):
+        own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
+        size = np.linalg.cholesky(np.linalg.inv(told.mean(0)[np.ix_(own, own)]))
+        courses = [("step", k) for k in range(1, 6)] + [("drift", k) for k in range(1, 6)]
+        for row, (kind, k) in enumerate(courses):
+            column = np.zeros((6 * p, len(own)))
+            for r in range(k, 6):
+                by = REACH if kind == "step" else DRIFT * (r - k + 1)
+                column[[r * p + i for i in own]] = by * size
+            other = np.logaddexp.reduce([
+                np.log(often) + _density(under + times**2 * column @ column.T, values)
+                for times, often in SIZES
+            ])  # fmt: skip
+            share = (0.9 if kind == "step" else 0.1) * weight_of(k + 1)
+            found[row, c] = np.log(share) + changes.log_weights[c] + float(other) - base
+    return found
+
+
 def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
     """Scores of all runs together, before and after the change is marginalised, over those where
     one effect after the other differs from run to run."""
@@ -41,38 +72,13 @@ def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
     place = [LABELS.index(label) for label in changes.pool.labels]
     changes.__dict__["prior"] = spread[place] ** -2.0
     changes.__dict__["within"] = np.ones((6, len(changes.terms)))
-    unit = np.tile(BOUND, 6)
     common = np.tile(np.diag(spread), (6, 1))
     null = cover + common @ common.T
 
-    def density(covariance: np.ndarray) -> float:
-        scaled = covariance / unit[:, None] / unit
-        return float(multivariate_normal(np.zeros(6 * p), scaled).logpdf(values / unit))
-
-    def changed(under: np.ndarray, told: np.ndarray) -> dict[tuple[int, int], float]:
-        """log w_k w_c B_ck of every course and effect; told: information (6, P, P) of the runs."""
-        found, base = {}, density(under)
-        for c, term in enumerate(changes.terms):
-            own = [LABELS.index(changes.pool.labels[i]) for i in term.index]
-            size = np.linalg.cholesky(np.linalg.inv(told.mean(0)[np.ix_(own, own)]))
-            courses = [("step", k) for k in range(1, 6)] + [("drift", k) for k in range(1, 6)]
-            for row, (kind, k) in enumerate(courses):
-                column = np.zeros((6 * p, len(own)))
-                for r in range(k, 6):
-                    by = REACH if kind == "step" else DRIFT * (r - k + 1)
-                    column[[r * p + i for i in own]] = by * size
-                other = np.logaddexp.reduce([
-                    np.log(often) + density(under + times**2 * column @ column.T)
-                    for times, often in SIZES
-                ])  # fmt: skip
-                share = (0.9 if kind == "step" else 0.1) * weight_of(k + 1)
-                found[row, c] = np.log(share) + changes.log_weights[c] + float(other) - base
-        return found
-
-    base = density(null)
+    base = _density(null, values)
     total, table = changes.log_evidence(6)
     none = float(np.log(1.0 - sum(weight_of(k + 1) for k in range(1, 6))))
-    alike = changed(null, normal)
+    alike = _changed(changes, values, null, normal)
     for at, expected in alike.items():
         assert table[at] == pytest.approx(expected, abs=1e-3)
     whole = [none, *alike.values()]
@@ -90,7 +96,7 @@ def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
             for r in range(6):
                 at = [r * p + i for i in own]
                 other[np.ix_(at, at)] += bounds**2 * usual
-            apart.append(odds + density(other) - base)
+            apart.append(odds + _density(other, values) - base)
             covers.append(other)
     assert changes.doubt(6) == pytest.approx(float(np.logaddexp.reduce(apart)), abs=1e-3)
     assert changes.doubt(6) > 1.0  # the oracle is asked where there is something to say
@@ -99,7 +105,7 @@ def test_the_evidence_is_that_of_the_dense_normal_density() -> None:
     own_cover = cover + covers[best] - null
     told = np.array([np.linalg.inv(own_cover[k * p : (k + 1) * p, k * p : (k + 1) * p])
                      for k in range(6)])  # fmt: skip
-    beside = np.logaddexp.reduce([none, *changed(covers[best], told).values()])
+    beside = np.logaddexp.reduce([none, *_changed(changes, values, covers[best], told).values()])
     expected = float(np.logaddexp(np.logaddexp.reduce(whole), apart[best] + beside))
     assert total == pytest.approx(expected - changes.doubt(6), abs=3e-3)
 
