@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -109,8 +110,8 @@ def test_every_output_says_it(make: object) -> None:
         for finding in found.findings:
             for estimate in finding.parameters.values():
                 assert estimate.text in said, (kind, estimate)
-        for other in ("None", "nan", "Record", "Estimate("):
-            assert kind == "page" or other not in said
+        # As words: the name of a temporary folder, which the console prints, may hold "nan".
+        assert kind == "page" or not re.search(r"\b(None|nan)\b|Record|Estimate\(", said)
     read = render_diagnose("json", found)
     assert ("held_rows" in read) == (found.gap.regime.held_rows is not None)
 
