@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -131,18 +132,29 @@ def log_odds_apart(effects: int) -> Array:
     return found
 
 
-def log_differing(normal: Array, score: Array, prior: Array, index: Index, usual: Array) -> Array:
+def log_differing(
+    normal: Array,
+    score: Array,
+    prior: Array,
+    index: Index,
+    usual: Array,
+    sizes: Sequence[float] = APART,
+    rows: Index | None = None,
+) -> Array:
     """log of how much likelier runs are where an effect has a value of its own in each, of the
-    covariances APART^2 `usual` (p, p) about what is common, than where it is one value, (S,).
+    covariances sizes^2 `usual` (p, p) about what is common, than where it is one value, (S,).
 
-    normal (n, P, P), score (n, P); prior (P, P) of what is common.  With K = S (1 + N_aa S)^-1 of a
+    normal (n, P, P), score (n, P); prior (P, P) of what is common; rows: runs that have a value of
+    their own, all of them.  With K = S (1 + N_aa S)^-1 of a
     run, N_aa its information of the effect and s its score of it,
         log L = sum (s' K s - log|1 + N_aa S|) / 2 + (g' T^-1 g - log|T|)' / 2 - (the same)_0 / 2,
     T and g the sums over runs, with the effect freed in each and as they are.
     """
-    across, own = normal[:, :, index], score[:, index]
-    inner = np.eye(index.size) + normal[:, index[:, None], index] @ _spreads(usual)[:, None]
-    kept = _spreads(usual)[:, None] @ np.linalg.inv(inner)
+    spreads = np.square(sizes)[:, None, None] * usual
+    apart = normal if rows is None else normal[rows]
+    across, own = apart[:, :, index], (score if rows is None else score[rows])[:, index]
+    inner = np.eye(index.size) + apart[:, index[:, None], index] @ spreads[:, None]
+    kept = spreads[:, None] @ np.linalg.inv(inner)
     moved = _side_by_side(across @ kept)
     total, scores = normal.sum(axis=0) + prior, score.sum(axis=0)
     totals = total - moved @ _side_by_side(across).T
@@ -151,11 +163,6 @@ def log_differing(normal: Array, score: Array, prior: Array, index: Index, usual
     alone -= np.sum(np.linalg.slogdet(inner)[1], axis=-1)
     every = _fitted(np.concatenate([total[None], totals]), np.concatenate([scores[None], lefts]))
     found: Array = 0.5 * (alone + every[1:] - every[0])
-    return found
-
-
-def _spreads(usual: Array) -> Array:
-    found: Array = np.square(APART)[:, None, None] * usual
     return found
 
 

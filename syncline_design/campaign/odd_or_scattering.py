@@ -1,0 +1,50 @@
+"""Whether some logs are unlike the others in an effect, or all have another value of it.
+
+Both free the effect, in the odd logs or in every log, by values of their own that are normal about
+the common one, of covariance S = size^2 times what one log leaves unsure.  With L the likelihood
+ratio of that against one value in all (`scatter.log_differing`), every size as likely as the next,
+    odds = p_all sum L_all / (p_odd^k sum L_odd),
+k logs being odd.  Logs that agree by chance while the effect scatters lose what they would gain by
+values of their own, so that few that agree are no proof of one value, and many are.
+Source: Kass and Raftery, J. Am. Stat. Assoc. 90 (1995), on Bayes factors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from syncline_design.campaign.pool import Index, Pool, Term, inverted
+from syncline_design.campaign.scatter import DIFFERING, log_differing
+from syncline_design.effects.record import Array
+
+ODD: Final = 0.1  # how often a log is unlike the others: one day in ten
+SIZES: Final = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # standard deviations of a log
+
+
+def rather_scatters(pool: Pool, beside: Sequence[Term], odd: Index, term: Term) -> bool:
+    """Whether an effect rather has another value in every log than in the odd ones alone.
+
+    beside: effects that have one value in all.
+    """
+    every, own = np.arange(pool.count), np.arange(term.size)
+    kept = np.concatenate([term.index, *(one.index for one in beside)])
+    normal, score = pool.normal[:, kept[:, None], kept], pool.score[:, kept]
+    scattering = math.log(DIFFERING) + _log_apart(normal, score, own, every)
+    return scattering > len(odd) * math.log(ODD) + _log_apart(normal, score, own, odd)
+
+
+def _log_apart(normal: Array, score: Array, own: Index, rows: Index) -> float:
+    """log sum L of some logs, over sizes, and over the effect as a whole and its parameters one by
+    one, each of these two kinds as likely as the other.  own: the effect's parameters."""
+    parts = [own] if own.size == 1 else [own, *own[:, None]]
+    usual, prior = normal.mean(axis=0), np.zeros(normal.shape[1:])
+    found = []
+    for part in parts:
+        unsure = inverted(usual[np.ix_(part, part)])
+        share = 0.0 if part.size == own.size else -math.log(own.size)
+        found.append(share + log_differing(normal, score, prior, part, unsure, SIZES, rows))
+    return float(np.logaddexp.reduce(np.ravel(found)))
