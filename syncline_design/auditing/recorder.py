@@ -2,7 +2,8 @@
 
 Receipts of all streams come from one clock, stamps from many.  A course of receipt minus stamp that
 one stream shows and the others confirm, each besides a drift of its own, is the recorder's; it is
-taken out of all receipts, and every stream is examined again without it.
+taken out of all receipts, and every stream is examined again without it.  Transport that all share
+is no clock (`shared_transport`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from syncline_design.auditing.clock_shapes import Shape, straddling
 from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, in_words, seconds, spread
+from syncline_design.auditing.shared_transport import lasting
 from syncline_design.auditing.stream import Examined, examined
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
@@ -114,6 +116,7 @@ def _shared(streams: Sequence[Examined]) -> _Course | None:
             if yes and 1 + yes >= _SHARE * (1 + len(able)):
                 kept.append(shape)
                 among = max(among, 1 + yes)
+        kept = lasting(anchor.blocks, kept) if anchor.blocks is not None else kept
         if kept and (best is None or len(kept) > len(best.shapes)):
             best = _Course(tuple(kept), among)
         if best is not None and len(best.shapes) == len(mine) and not rest:
