@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from syncline_design import __version__
+from syncline_design.auditing.opened import Opened, recordings
 from syncline_design.auditing.recorder import without_recorder_clock
 from syncline_design.auditing.result import (
     Audit,
@@ -24,25 +24,12 @@ from syncline_design.auditing.series import in_words
 from syncline_design.auditing.stream import Examined, examined, is_receipt
 from syncline_design.auditing.together import held_together
 from syncline_design.logs.readers import open_recording
-from syncline_design.logs.readers.stream import UNSET, Incomplete, Stream
+from syncline_design.logs.readers.stream import UNSET, Stream
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import ContentsBeside, FileRead, note_read
-from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import percent
 from syncline_design.spec.load import BadInput
-
-_CSV: Final = "CSV"
-
-
-@dataclass(frozen=True, slots=True)
-class _Opened:
-    """One file's streams."""
-
-    path: Path
-    format: str
-    streams: tuple[Stream, ...]
-    incomplete: Incomplete | None
 
 
 def audit(paths: Sequence[Path]) -> Audit:
@@ -52,7 +39,7 @@ def audit(paths: Sequence[Path]) -> Audit:
     if not opened:
         raise BadInput(tuple(flaw for error in problems for flaw in error.problems))
     rows: list[StreamAudit] = []
-    for group in _recordings(opened):
+    for group in recordings(opened):
         rows += _rows(group)
     damaged = tuple(
         IncompleteFile(str(o.path), o.incomplete.reason, o.incomplete.messages)
@@ -73,8 +60,8 @@ def audit(paths: Sequence[Path]) -> Audit:
 
 def _open(
     paths: Sequence[Path],
-) -> tuple[list[_Opened], tuple[IncompleteFile, ...], list[BadInput]]:
-    opened: list[_Opened] = []
+) -> tuple[list[Opened], tuple[IncompleteFile, ...], list[BadInput]]:
+    opened: list[Opened] = []
     refused: list[IncompleteFile] = []
     problems: list[BadInput] = []
     for path in paths:
@@ -92,11 +79,11 @@ def _open(
             refused.append(IncompleteFile(str(path), lacks, 0))
             problems.append(refuse(path, lacks, expected="at least one message with a stamp"))
             continue
-        opened.append(_Opened(path, recording.format, streams, recording.incomplete))
+        opened.append(Opened(path, recording.format, streams, recording.incomplete))
     return opened, tuple(refused), problems
 
 
-def _unexamined(opened: _Opened) -> Iterator[IncompleteFile]:
+def _unexamined(opened: Opened) -> Iterator[IncompleteFile]:
     """Streams that could not be read, and a file of which none was examined: no word is said of
     their stamps, so that they are not sound."""
     for stream in opened.streams:
@@ -124,14 +111,7 @@ def _timed(stream: Stream) -> bool:
     return any(one is not None and bool(np.any(one != UNSET)) for one in kinds)
 
 
-def _recordings(opened: Sequence[_Opened]) -> list[list[_Opened]]:
-    """Files of one recorder: every CSV file is one stream of it, other files stand alone."""
-    tables = [one for one in opened if one.format.startswith(_CSV)]
-    others = [[one] for one in opened if not one.format.startswith(_CSV)]
-    return ([tables] if tables else []) + others
-
-
-def _rows(group: Sequence[_Opened]) -> list[StreamAudit]:
+def _rows(group: Sequence[Opened]) -> list[StreamAudit]:
     in_force().doing("auditing stamps")
     starts = [s for o in group for stream in o.streams if (s := _first(stream)) is not None]
     start = min(starts) if starts and max(starts) - min(starts) < 10**15 else None
@@ -162,7 +142,7 @@ def _is_told(stream: Stream) -> bool:
     return stamps.secondary_ns is not None or not is_receipt(stamps.primary)
 
 
-def _untold(opened: _Opened, stream: Stream) -> StreamAudit:
+def _untold(opened: Opened, stream: Stream) -> StreamAudit:
     """A stream whose messages carry no time of their own, or points in no order of time."""
     stamps = stream.stamps
     names = StampNames(None, None) if stamps is None else StampNames(None, stamps.primary)
@@ -197,7 +177,7 @@ def _why_untold(stream: Stream) -> str:
     return "its messages carry no stamp of their own"
 
 
-def _row(opened: _Opened, one: Examined) -> StreamAudit:
+def _row(opened: Opened, one: Examined) -> StreamAudit:
     stream = one.stream
     assert stream.stamps is not None
     times = one.raw.seconds[one.raw.good]
@@ -305,7 +285,7 @@ def files_of(path: Path) -> list[Path]:
         return []
 
 
-def _evidence(opened: Sequence[_Opened], contents: ContentsBeside) -> tuple[FileRead, ...]:
+def _evidence(opened: Sequence[Opened], contents: ContentsBeside) -> tuple[FileRead, ...]:
     """The files that were opened, by their contents."""
     read = {str(one) for o in opened for one in files_of(o.path)}
     return tuple(one for one in contents.reads() if one.file in read)

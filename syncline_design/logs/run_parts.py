@@ -76,7 +76,7 @@ class RunParts:
         for part in self._parts:
             for one in part.streams():
                 found.setdefault(one.name, []).append(one)
-        return tuple(_joined(found[name]) for name in sorted(found))
+        return tuple(joined(found[name]) for name in sorted(found))
 
     def samples(self, name: str) -> Iterator[Piece]:
         for part in self._parts:
@@ -90,7 +90,7 @@ def one_run(recordings: Sequence[Recording]) -> list[Recording]:
     for recording in recordings:
         known = recording if isinstance(recording, KnownRecording) else KnownRecording(recording)
         for group in groups:
-            if known.format == group[0].format and _alike(group[0].streams(), known.streams()):
+            if known.format == group[0].format and alike(group[0].streams(), known.streams()):
                 group.append(known)
                 break
         else:
@@ -103,10 +103,11 @@ def one_run(recordings: Sequence[Recording]) -> list[Recording]:
     return found
 
 
-def _alike(one: Sequence[Stream], other: Sequence[Stream]) -> bool:
+def alike(one: Sequence[Stream], other: Sequence[Stream], least: int = LEAST_SHARED) -> bool:
+    """Whether two files hold the same streams, as many of them as that."""
     a, b = ({(s.name, s.kind) for s in streams} for streams in (one, other))
     shared = len(a & b)
-    return shared >= LEAST_SHARED and shared >= SHARED * min(len(a), len(b))
+    return shared >= least and shared >= SHARED * min(len(a), len(b))
 
 
 def _span(recording: Recording) -> tuple[int, int]:
@@ -125,18 +126,19 @@ def _span(recording: Recording) -> tuple[int, int]:
     return int(np.median(firsts)), int(np.median(lasts))
 
 
-def _joined(parts: Sequence[Stream]) -> Stream:
-    """A stream of several parts; the notes of all, each once."""
+def joined(parts: Sequence[Stream], note: str = "") -> Stream:
+    """A stream of several parts; the notes of all, each once, and one that says so."""
     first = parts[0]
     if len(parts) == 1:
         return first
-    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
+    notes = [own for part in parts for own in part.notes]
+    notes += [note] if note else []
     return replace(
         first,
         messages=sum(part.messages for part in parts),
         stamps=_stamps([part.stamps for part in parts]),
         partial=any(part.partial for part in parts),
-        notes=notes,
+        notes=tuple(dict.fromkeys(notes)),
     )
 
 

@@ -1,0 +1,103 @@
+"""Files as they were opened, and which of them are one recording.
+
+CSV files are streams of one recorder.  A bag that its recorder split by size or by time is several
+files of the same streams, each of which begins when the one before ends: they are audited as one,
+for what goes wrong where two of them meet shows in neither.  Files of two runs do not adjoin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from syncline_design.auditing.series import NS
+from syncline_design.logs.readers.stream import UNSET, Incomplete, Nanoseconds, Stream
+from syncline_design.logs.run_parts import alike, joined
+from syncline_design.machine.quick_dataclass import dataclass
+
+_CSV: Final = "CSV"
+_ADJOIN_S: Final = 1.0  # between the receipts of one part and of the next, ...
+_INTERVALS: Final = 10.0  # ... or so many intervals of the stream that tells most of it
+_BACK_S: Final = 0.1  # what was still under way when the file was closed
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """One file's streams, or those of all parts of a recording, by the first of them."""
+
+    path: Path
+    format: str
+    streams: tuple[Stream, ...]
+    incomplete: Incomplete | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Span:
+    """When a file's messages were received [s]; interval_s: usual one of its quickest stream."""
+
+    first_s: float
+    last_s: float
+    interval_s: float
+
+
+def recordings(opened: Sequence[Opened]) -> list[list[Opened]]:
+    """Files of one recorder: every CSV file is one stream of it, parts of a recording are one."""
+    whole = _with_parts_joined(opened)
+    tables = [one for one in whole if one.format.startswith(_CSV)]
+    others = [one for one in whole if not one.format.startswith(_CSV)]
+    return ([tables] if tables else []) + [[one] for one in others]
+
+
+def _with_parts_joined(opened: Sequence[Opened]) -> list[Opened]:
+    spans = {id(one): _span(one) for one in opened}
+    chains: list[list[Opened]] = []
+    for one in sorted(opened, key=lambda one: _first(spans, one)):
+        before = next((c for c in chains if _adjoin(c[-1], one, spans)), None)
+        if before is None:
+            chains.append([one])
+        else:
+            before.append(one)
+    return [_one_recording(chain) for chain in chains]
+
+
+def _first(spans: dict[int, _Span | None], one: Opened) -> float:
+    span = spans[id(one)]
+    return 0.0 if span is None else span.first_s
+
+
+def _adjoin(one: Opened, other: Opened, spans: dict[int, _Span | None]) -> bool:
+    before, after = spans[id(one)], spans[id(other)]
+    if before is None or after is None or one.format != other.format:
+        return False
+    apart = after.first_s - before.last_s
+    near = max(_ADJOIN_S, _INTERVALS * max(before.interval_s, after.interval_s))
+    return -_BACK_S <= apart <= near and alike(one.streams, other.streams, 1)
+
+
+def _span(one: Opened) -> _Span | None:
+    """None of a file whose messages were received at no known time."""
+    received = [each for stream in one.streams if (each := _received(stream)) is not None]
+    times = [each[each != UNSET] for each in received]
+    known = [each for each in times if each.size > 1]
+    if not known:
+        return None
+    first, last = min(int(t.min()) for t in known), max(int(t.max()) for t in known)
+    return _Span(first / NS, last / NS, (last - first) / NS / max(t.size for t in known))
+
+
+def _received(stream: Stream) -> Nanoseconds | None:
+    return None if stream.stamps is None or stream.unread else stream.stamps.secondary_ns
+
+
+def _one_recording(parts: Sequence[Opened]) -> Opened:
+    if len(parts) == 1:
+        return parts[0]
+    names = ", ".join(part.path.name for part in parts[1:])
+    note = f"read on from {parts[0].path.name} into {names}: parts of one recording"
+    streams: dict[str, list[Stream]] = {}
+    for part in parts:
+        for stream in part.streams:
+            streams.setdefault(stream.name, []).append(stream)
+    every = tuple(joined(of_one, note if len(of_one) > 1 else "") for of_one in streams.values())
+    return Opened(parts[0].path, parts[0].format, every, None)
