@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.auditing.opened import Opened, recordings
+from syncline_design.auditing.file_streams import FileStreams, recordings
 from syncline_design.auditing.recorder import without_recorder_clock
 from syncline_design.auditing.result import (
     Audit,
@@ -60,8 +60,8 @@ def audit(paths: Sequence[Path]) -> Audit:
 
 def _open(
     paths: Sequence[Path],
-) -> tuple[list[Opened], tuple[IncompleteFile, ...], list[BadInput]]:
-    opened: list[Opened] = []
+) -> tuple[list[FileStreams], tuple[IncompleteFile, ...], list[BadInput]]:
+    opened: list[FileStreams] = []
     refused: list[IncompleteFile] = []
     problems: list[BadInput] = []
     for path in paths:
@@ -79,11 +79,11 @@ def _open(
             refused.append(IncompleteFile(str(path), lacks, 0))
             problems.append(refuse(path, lacks, expected="at least one message with a stamp"))
             continue
-        opened.append(Opened(path, recording.format, streams, recording.incomplete))
+        opened.append(FileStreams(path, recording.format, streams, recording.incomplete))
     return opened, tuple(refused), problems
 
 
-def _unexamined(opened: Opened) -> Iterator[IncompleteFile]:
+def _unexamined(opened: FileStreams) -> Iterator[IncompleteFile]:
     """Streams that could not be read, and a file of which none was examined: no word is said of
     their stamps, so that they are not sound."""
     for stream in opened.streams:
@@ -111,7 +111,7 @@ def _timed(stream: Stream) -> bool:
     return any(one is not None and bool(np.any(one != UNSET)) for one in kinds)
 
 
-def _rows(group: Sequence[Opened]) -> list[StreamAudit]:
+def _rows(group: Sequence[FileStreams]) -> list[StreamAudit]:
     in_force().doing("auditing stamps")
     starts = [s for o in group for stream in o.streams if (s := _first(stream)) is not None]
     start = min(starts) if starts and max(starts) - min(starts) < 10**15 else None
@@ -142,7 +142,7 @@ def _is_told(stream: Stream) -> bool:
     return stamps.secondary_ns is not None or not is_receipt(stamps.primary)
 
 
-def _untold(opened: Opened, stream: Stream) -> StreamAudit:
+def _untold(opened: FileStreams, stream: Stream) -> StreamAudit:
     """A stream whose messages carry no time of their own, or points in no order of time."""
     stamps = stream.stamps
     names = StampNames(None, None) if stamps is None else StampNames(None, stamps.primary)
@@ -177,7 +177,7 @@ def _why_untold(stream: Stream) -> str:
     return "its messages carry no stamp of their own"
 
 
-def _row(opened: Opened, one: Examined) -> StreamAudit:
+def _row(opened: FileStreams, one: Examined) -> StreamAudit:
     stream = one.stream
     assert stream.stamps is not None
     times = one.raw.seconds[one.raw.good]
@@ -285,7 +285,7 @@ def files_of(path: Path) -> list[Path]:
         return []
 
 
-def _evidence(opened: Sequence[Opened], contents: ContentsBeside) -> tuple[FileRead, ...]:
+def _evidence(opened: Sequence[FileStreams], contents: ContentsBeside) -> tuple[FileRead, ...]:
     """The files that were opened, by their contents."""
     read = {str(one) for o in opened for one in files_of(o.path)}
     return tuple(one for one in contents.reads() if one.file in read)

@@ -23,7 +23,7 @@ _BACK_S: Final = 0.1  # what was still under way when the file was closed
 
 
 @dataclass(frozen=True, slots=True)
-class Opened:
+class FileStreams:
     """One file's streams, or those of all parts of a recording, by the first of them."""
 
     path: Path
@@ -41,7 +41,7 @@ class _Span:
     interval_s: float
 
 
-def recordings(opened: Sequence[Opened]) -> list[list[Opened]]:
+def recordings(opened: Sequence[FileStreams]) -> list[list[FileStreams]]:
     """Files of one recorder: every CSV file is one stream of it, parts of a recording are one."""
     whole = _with_parts_joined(opened)
     tables = [one for one in whole if one.format.startswith(_CSV)]
@@ -49,9 +49,9 @@ def recordings(opened: Sequence[Opened]) -> list[list[Opened]]:
     return ([tables] if tables else []) + [[one] for one in others]
 
 
-def _with_parts_joined(opened: Sequence[Opened]) -> list[Opened]:
+def _with_parts_joined(opened: Sequence[FileStreams]) -> list[FileStreams]:
     spans = {id(one): _span(one) for one in opened}
-    chains: list[list[Opened]] = []
+    chains: list[list[FileStreams]] = []
     for one in sorted(opened, key=lambda one: _first(spans, one)):
         before = next((c for c in chains if _adjoin(c[-1], one, spans)), None)
         if before is None:
@@ -61,12 +61,12 @@ def _with_parts_joined(opened: Sequence[Opened]) -> list[Opened]:
     return [_one_recording(chain) for chain in chains]
 
 
-def _first(spans: dict[int, _Span | None], one: Opened) -> float:
+def _first(spans: dict[int, _Span | None], one: FileStreams) -> float:
     span = spans[id(one)]
     return 0.0 if span is None else span.first_s
 
 
-def _adjoin(one: Opened, other: Opened, spans: dict[int, _Span | None]) -> bool:
+def _adjoin(one: FileStreams, other: FileStreams, spans: dict[int, _Span | None]) -> bool:
     before, after = spans[id(one)], spans[id(other)]
     if before is None or after is None or one.format != other.format:
         return False
@@ -75,7 +75,7 @@ def _adjoin(one: Opened, other: Opened, spans: dict[int, _Span | None]) -> bool:
     return -_BACK_S <= apart <= near and alike(one.streams, other.streams, 1)
 
 
-def _span(one: Opened) -> _Span | None:
+def _span(one: FileStreams) -> _Span | None:
     """None of a file whose messages were received at no known time."""
     received = [each for stream in one.streams if (each := _received(stream)) is not None]
     times = [each[each != UNSET] for each in received]
@@ -90,7 +90,7 @@ def _received(stream: Stream) -> Nanoseconds | None:
     return None if stream.stamps is None or stream.unread else stream.stamps.secondary_ns
 
 
-def _one_recording(parts: Sequence[Opened]) -> Opened:
+def _one_recording(parts: Sequence[FileStreams]) -> FileStreams:
     if len(parts) == 1:
         return parts[0]
     names = ", ".join(part.path.name for part in parts[1:])
@@ -100,4 +100,4 @@ def _one_recording(parts: Sequence[Opened]) -> Opened:
         for stream in part.streams:
             streams.setdefault(stream.name, []).append(stream)
     every = tuple(joined(of_one, note if len(of_one) > 1 else "") for of_one in streams.values())
-    return Opened(parts[0].path, parts[0].format, every, None)
+    return FileStreams(parts[0].path, parts[0].format, every, None)
