@@ -119,15 +119,16 @@ def _limits(case: Case, kind: str) -> tuple[float, ...]:
 def expected_rms_m(data: Data) -> float:
     """RMS of the 3-D error [m] that the spec's own noise makes on the components compared."""
     variance = marginal_variance(data.structure, as_specified(data.structure))
-    return float(np.sqrt(np.mean(np.sum(variance * _compared(data), axis=1))))
+    return float(np.sqrt(np.mean(np.sum(variance * compared(data), axis=1))))
 
 
 def rms_m(data: Data, error: Array) -> float:
     """RMS of a 3-D error [m] on the components compared."""
-    return float(np.sqrt(np.mean(np.sum(np.square(error) * _compared(data), axis=1))))
+    return float(np.sqrt(np.mean(np.sum(np.square(error) * compared(data), axis=1))))
 
 
-def _compared(data: Data) -> Array:
+def compared(data: Data) -> Array:
+    """Which components (n, 3) of the error the log tells."""
     return np.isfinite(data.view.log.truth_m)
 
 

@@ -13,7 +13,7 @@ from syncline_design.diagnosis.consequence import Weights
 from syncline_design.diagnosis.identify import Alias, Comparison
 from syncline_design.diagnosis.lines import wave_of
 from syncline_design.diagnosis.one_value import Uneven
-from syncline_design.diagnosis.result import Estimate, Finding, Rival
+from syncline_design.diagnosis.result import Estimate, Finding, Rival, WithinNoise
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.effects.record import Effect
@@ -103,15 +103,20 @@ def finding(
     )
 
 
-def evidence_words(gain: float, log10_p: float | None, *, noise_kept: bool = False) -> str:
+def evidence_words(
+    gain: float, log10_p: float | None, *, noise_kept: bool = False, changing: bool = False
+) -> str:
     """What an effect saves, and the chance that noise alone saves as much (None: none at all).
+
+    changing: noise that stays the same over the log is not meant, for it would do the same.
 
     noise_kept: against the noise that is left with it, and not against one that is fitted anew
     without it, which would take much of a large effect for noise.
     """
     chance = format_chance(log10_p)
     kept = " with the noise kept" if noise_kept else ""
-    return f"saves {format_nats(gain)}{kept}; noise alone does that with a chance of {chance}"
+    noise = "noise that changes along the log" if changing else "noise alone"
+    return f"saves {format_nats(gain)}{kept}; {noise} does that with a chance of {chance}"
 
 
 def is_noise(effect: Effect) -> bool:
@@ -135,11 +140,13 @@ def named_finding(
     found: Mapping[str, Estimate],
     size_m: float,
     weights: Weights,
+    constant: WithinNoise | None = None,
 ) -> Finding:
+    """One effect of the final model, with its RMS; constant: noise that would do the same."""
     view, evidence = final.data.view, final.evidence[label]
     compared = final.classes.get(label, Comparison())
     log10_p = evidence.log_p / math.log(10.0) if math.isfinite(evidence.log_p) else None
-    words = evidence_words(evidence.gain, log10_p)
+    words = evidence_words(evidence.gain, log10_p, changing=constant is not None)
     lists = (compared.aliases, compared.lookalikes, compared.excluded[:MOST_EXCLUDED])
     wider = _wider(final, label)
     aliases, lookalikes, excluded = (tuple(_rival(view, a, wider) for a in own) for own in lists)
@@ -152,7 +159,7 @@ def named_finding(
     named = finding(
         effect, label[1], where, found, words, evidence.gain, log10_p, rivals, material, size_m
     )
-    return _uneven(named, final.uneven.get(label))
+    return _uneven(replace(named, within_noise=constant), final.uneven.get(label))
 
 
 def _uneven(named: Finding, found: Uneven | None) -> Finding:

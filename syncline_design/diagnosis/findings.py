@@ -11,6 +11,7 @@ import numpy as np
 
 from syncline_design.diagnosis.cancelling import cancelling
 from syncline_design.diagnosis.consequence import Weights, rms_m
+from syncline_design.diagnosis.constant_noise import within_noise
 from syncline_design.diagnosis.finding import Label, estimate, finding, named_finding
 from syncline_design.diagnosis.fitting import Model
 from syncline_design.diagnosis.gross import Gross
@@ -103,8 +104,9 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
         said = wave.shown({p.name: one.values[p.name] for p in one.effect.parameters})
         found = {name: estimate(value, None, unit) for name, (value, unit) in said.items()}
     others = tuple(a for a in model.acting if a.label != one.label)
-    size_m = rms_m(final.data, final.data.error(others) - model.error)
-    named = named_finding(final, one.effect, one.label, found, size_m, weights)
+    made = final.data.error(others) - model.error
+    size_m, constant = rms_m(final.data, made), within_noise(final.data, made)
+    named = named_finding(final, one.effect, one.label, found, size_m, weights, constant)
     if one.label in final.refuted:
         named = replace(named, kind="stand_in")
     part = _in_its_part(named, one.effect, final.data.view.log.ends_s)

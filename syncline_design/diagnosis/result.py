@@ -98,6 +98,16 @@ class Stretch(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class WithinNoise(Record):
+    """The sensor whose noise, the same over the whole log, would do what an effect does, and at how
+    many of the spec's standard deviations of the reading that needs most."""
+
+    stage: str
+    sensor: str
+    sigmas: float
+
+
+@dataclass(frozen=True, slots=True)
 class PerLog(Record):
     """An effect in one of several logs, by its number from 1; start: of the system."""
 
@@ -132,6 +142,7 @@ class Finding(Record):
     changed_once: of what is built in, that its being cut to a part that one end of the log ends is
     all that makes it a stand-in: it does not come and go, but a knock may have changed it.
     readings: of a sensor's noise, deviations over the spec's by reading, where they are unlike.
+    within_noise: of a cause, that constant noise within the spec's would do the same.
     scope: of several logs together, whether it is one value in all (build), one a start of the
     system, or one a log; per_log: its values where it is not one.  each_log: what every log by
     itself tells of one that is one value.  one_value: chance by which the logs would differ so much
@@ -168,6 +179,7 @@ class Finding(Record):
     one_value: float | None = optional()
     each_log: tuple[PerLog, ...] | None = optional()
     readings: Mapping[str, float] | None = optional()
+    within_noise: WithinNoise | None = optional()
 
     @property
     def open_aliases(self) -> tuple[Rival, ...]:

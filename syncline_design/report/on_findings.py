@@ -14,6 +14,7 @@ from syncline_design.diagnosis.result import (
     NextDrive,
     Rival,
     Stretch,
+    WithinNoise,
     readings_words,
 )
 from syncline_design.effects import registry
@@ -41,8 +42,10 @@ NAT: Final = (
 
 
 def called(one: Finding) -> str:
-    """The sentence of a cause; of a stand-in, that it is none."""
+    """The sentence of a cause; of a stand-in, that it is none; of what noise may do, that too."""
     text = one.sentence
+    if one.within_noise is not None:
+        text = f"{text}; constant noise of {one.within_noise.sensor} would do the same"
     return text if one.kind == "cause" else f"Not as a cause, as the nearest word for it: {text}"
 
 
@@ -127,6 +130,13 @@ def _figures_of(one: Finding) -> str:
     return ", ".join(estimate.text for estimate in one.parameters.values())
 
 
+def _noise_instead(noise: WithinNoise) -> str:
+    return (
+        f"It cannot be told from noise of {noise.sensor} that stays the same over the whole log: "
+        f"{numbers.number(noise.sigmas, 2)} times the spec's standard deviation does the same."
+    )
+
+
 def _varying_text(found: Finding, varying: Sequence[Stretch]) -> str:
     """How a parameter varies: stretch by stretch, or by how much from one to the next."""
     if found.varying_std is None or found.varying_over_s is None:
@@ -180,6 +190,8 @@ def finding_node(found: Finding, drive: NextDrive | None = None, *, first: bool 
         *([Text(NAT, quiet=True)] if first and " nat" in found.evidence else []),
         *scope_nodes(found),
     ]
+    if found.within_noise is not None:
+        nodes.append(Text(_noise_instead(found.within_noise), mark="!", tone="warn"))
     if found.varying:
         nodes.append(Text(_varying_text(found, found.varying), mark="!"))
     open_ = found.open_aliases
