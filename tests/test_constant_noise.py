@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 
 from syncline_design.comparison.meaning import with_design
+from syncline_design.comparison.repair_options import remedies
 from syncline_design.diagnosis import diagnose
 from syncline_design.diagnosis.result import Diagnosis, Finding
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.render_console import console
+from syncline_design.spec.load import load
 from tests.world import Hidden, hidden, make_log, scenario
 
 
@@ -54,6 +56,9 @@ def test_a_datum_within_the_noise_of_position_is_said_to_be(tmp_path: Path, time
     assert one.within_noise.sigmas == pytest.approx(largest, rel=0.02)
     assert words in said(found)
     assert "noise that changes along the log does that with a chance" in one.evidence
+    case = load(tmp_path / "spec.yaml")
+    (calibrated,) = (r for r in remedies(case, case, one) if r.kind == "calibrate")
+    assert calibrated.assumes.startswith("a log of another day shows it again")
 
 
 def test_an_arm_of_a_vehicle_that_turns_is_no_constant_of_a_sensor(tmp_path: Path) -> None:

@@ -92,6 +92,16 @@ def applied(case: Case, remedies: Sequence[Remedy]) -> Case:
     return with_effects(case, left)
 
 
+def _proviso(finding: Finding) -> str:
+    """What a calibration rests on."""
+    if finding.within_noise is None:
+        return "it stays as it was found"
+    return (
+        f"a log of another day shows it again, for constant noise of {finding.within_noise.sensor} "
+        "would do the same"
+    )
+
+
 def compatible(remedies: Sequence[Remedy]) -> bool:
     """Whether all of them can be done: no role is to have two sensors or to be stamped two ways."""
     wanted: dict[tuple[int, str], PinnedRole] = {}
@@ -113,7 +123,7 @@ def remedies(case: Case, whole: Case, finding: Finding) -> Iterator[Remedy]:
     if left is not None:
         yield Remedy(
             "calibrate", finding, f"take the {_name(finding)} into the calibration",
-            "it stays as it was found; what remains is its 95 % interval", left=left,
+            f"{_proviso(finding)}; what remains is its 95 % interval", left=left,
         )  # fmt: skip
     stage = next((one for one in case.stages if one.choice.name == finding.stage), None)
     role = None if stage is None or finding.also else stage.role(finding.sensor)  # type: ignore[arg-type]
