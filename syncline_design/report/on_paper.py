@@ -40,6 +40,7 @@ _TITLES: Final = {
     "tau_crit_survey": "\u03c4_crit, subsea survey",
     "text": "Figures in the text",
     "platforms": "Robot platforms",
+    "sensors": "Sensors",
     "position": "Sensor noise, position",
     "attitude": "Sensor noise, attitude",
     "ranging": "Sensor noise, ranging",
