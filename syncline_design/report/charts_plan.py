@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 MOST_POINTS = 2000
 LEGEND_ROW = 18.0  # SVG units that a row of the legend takes
 FAR = 1e6  # times what is asked: not seen yet, and off the scale
+_MARKERS: Final = ("o", "s", "^")
 
 
 def path(run: PlanRun) -> InlineChart:
@@ -99,7 +100,9 @@ def after(found: Plan) -> InlineChart:
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         for k, key in enumerate(keys):
-            axes.plot(legs, _ratios(found, key), marker="o", markersize=3.5,
+            again = k // len(SERIES)  # colours are fewer than parameters may be
+            axes.plot(legs, _ratios(found, key), marker=_MARKERS[again % len(_MARKERS)],
+                      markersize=3.5, linestyle="--" if again else "-",
                       color=SERIES[k % len(SERIES)], label=parameter(key))  # fmt: skip
             for leg, ratio in zip(legs, _ratios(found, key), strict=True):
                 tell(axes, leg, min(ratio, FAR), [("Leg", str(leg)), ("Effect", parameter(key)),
