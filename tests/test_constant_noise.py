@@ -47,6 +47,7 @@ def test_a_datum_within_the_noise_of_position_is_said_to_be(tmp_path: Path, time
     if times > 1.0:
         assert one.within_noise is None
         assert words not in said(found)
+        assert "Explained: what is missing was found" in said(found)
         return
     assert one.within_noise is not None
     assert one.within_noise.sensor == "position"
@@ -55,6 +56,7 @@ def test_a_datum_within_the_noise_of_position_is_said_to_be(tmp_path: Path, time
     )
     assert one.within_noise.sigmas == pytest.approx(largest, rel=0.02)
     assert words in said(found)
+    assert "Explained, or within the spec: constant noise" in said(found)
     assert "noise that changes along the log does that with a chance" in one.evidence
     case = load(tmp_path / "spec.yaml")
     (calibrated,) = (r for r in remedies(case, case, one) if r.kind == "calibrate")

@@ -64,6 +64,9 @@ DIAGNOSES: Final[dict[str, Outcome]] = {
 _UNSOUND: Final = Outcome(
     "bad", "!", "Unexplained: the log contradicts itself or the limits of the spec's platform"
 )
+_CONSTANT: Final = Outcome(
+    "warn", "!", "Explained, or within the spec: constant noise of its size would do the same"
+)
 LARGE: Final = 1.25  # times the RMS that the spec's noise expects: said in the outcome
 MOST_REGIMES: Final = 4  # told outside the page
 
@@ -146,6 +149,8 @@ def outcome_of(found: Diagnosis) -> Outcome:
     if found.joint is not None and found.joint.unlike:
         return _unlike_outcome(found.joint.unlike)
     known, times = DIAGNOSES[found.verdict], _times_expected(found.gap)
+    if _maybe_constant(found):
+        known = _CONSTANT
     if _maybe_slow(found):
         return Outcome(
             "warn",
@@ -157,6 +162,12 @@ def outcome_of(found: Diagnosis) -> Outcome:
         return known
     more = f"{known.word}, {numbers.number(times, 2)} times what the spec expects"
     return Outcome(known.tone, known.mark, more)
+
+
+def _maybe_constant(found: Diagnosis) -> bool:
+    """Whether constant noise within the spec's would do all that was found."""
+    told = [one for one in found.findings if one.material]
+    return found.verdict == "explained" and all(one.within_noise is not None for one in told)
 
 
 def _maybe_slow(found: Diagnosis) -> bool:
