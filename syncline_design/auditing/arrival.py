@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.cadence import Cadence, about_rhythm, without_losses
 from syncline_design.auditing.frames import FRAMES_S, FULL_SPEED_S, Framed, framed
-from syncline_design.auditing.late_scatter import Waits, waits_of
+from syncline_design.auditing.late_scatter import Waits, long_waits_of, waits_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Mask, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import PointTimes
@@ -49,7 +49,8 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
         return StampFault("stamped_on_arrival", {}, None, None,
                           "every stamp equals its receipt")  # fmt: skip
     transport = _width(late)
-    late_ones = _scattered(about, late) or _waited(without_losses(when, pace), late)
+    late_ones = _scattered(about, late) or _waited(waits_of(without_losses(when, pace)), late)
+    late_ones = late_ones or _waited(long_waits_of(when), late)
     return late_ones or _in_frames(when, transport)
 
 
@@ -72,9 +73,8 @@ def _scattered(about: Array | None, late: Array) -> StampFault | None:
     )  # fmt: skip
 
 
-def _waited(when: Array, late: Array) -> StampFault | None:
+def _waited(waits: Waits | None, late: Array) -> StampFault | None:
     """By delays as long as the sensor's interval: none before its turn, many after."""
-    waits = waits_of(when)
     if waits is None or not waits.late:
         return None
     own = spread(waits.about_s)

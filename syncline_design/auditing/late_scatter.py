@@ -8,6 +8,7 @@ scatters about its rhythm does so to both sides.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,11 @@ from syncline_design.auditing.series import Array, scatter, spread
 from syncline_design.machine.quick_dataclass import dataclass
 
 _BLOCK: Final = 12  # messages, of which the fastest hardly waits
+_LONGER: Final = (24, 48, 96, 192)
+_TOGETHER: Final = 0.1  # of the mean interval
+_BUNCHED: Final = 0.25  # of all messages
+_READ_S: Final = 4e-4  # that a host takes to read a message at most
+_UNLIKE: Final = 0.3  # of what bunches are apart: publishers in turn are alike
 _LEAST_BLOCKS: Final = 12
 _LAG: Final = 64
 _WALKS: Final = 0.45  # of a block's spread: how far floors differ; of a random walk 1.2
@@ -44,13 +50,46 @@ class Waits:
 
 def waits_of(when: Array) -> Waits | None:
     """None where stamps [s] keep to no line, or repeat a pattern."""
-    if when.size < max(_LEAST_BLOCKS * _BLOCK, 2 * _LAG):
+    waits = _over(when, _BLOCK, _LAG)
+    return None if waits is None or _repeats(np.diff(when)) else waits
+
+
+def long_waits_of(when: Array) -> Waits | None:
+    """Of delays of several intervals, which no dozen of messages is without: of more messages the
+    fastest hardly waited.  What walks does so over any number of them.
+
+    Where messages come at once, after those that they waited for, and no sensor measures so, they
+    were late however their delays are distributed.
+    """
+    at_once = come_at_once(when)
+    for block in _LONGER:
+        waits = _over(when, block, 4 * block)
+        if waits is not None and (at_once or not _repeats(np.diff(when))):
+            return replace(waits, late=waits.late or at_once, edged=False)
+    return None
+
+
+def come_at_once(when: Array) -> bool:
+    """Whether many messages follow others faster than any sensor measures, after unlike times."""
+    if when.size < _LEAST_BLOCKS * _BLOCK:
+        return False
+    passed = np.diff(when)
+    together = passed < _TOGETHER * float(np.mean(passed))
+    if float(np.mean(together)) < _BUNCHED or float(np.median(passed[together])) > _READ_S:
+        return False
+    apart = np.diff(when[1:][~together])
+    return spread(apart) > _UNLIKE * float(np.median(apart))
+
+
+def _over(when: Array, block: int, lag: int) -> Waits | None:
+    """By the least of every `block` messages; the interval by messages so many apart."""
+    if when.size < max(_LEAST_BLOCKS * block, 2 * lag):
         return None
-    period = float(np.median(when[_LAG:] - when[:-_LAG])) / _LAG
-    if period <= 0.0 or _repeats(np.diff(when)):
+    period = float(np.median(when[lag:] - when[:-lag])) / lag
+    if period <= 0.0:
         return None
     away = when - period * np.arange(when.size)
-    blocks = away[: away.size // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
+    blocks = away[: away.size // block * block].reshape(-1, block)
     low, middle, high = (np.percentile(blocks, p, axis=1) for p in (0.0, 50.0, 100.0))
     width = float(np.median(np.subtract(*np.percentile(blocks, [75.0, 25.0], axis=1))))
     floors, ceilings = (scatter(np.diff(edge)) / float(np.sqrt(2.0)) for edge in (low, high))

@@ -10,7 +10,7 @@ from syncline_design.auditing.cadence import Cadence, cadence, counted_over_gaps
 from syncline_design.auditing.coarse_rhythm import counted_behind
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.frames import FULL_SPEED_S, TICKS_S
-from syncline_design.auditing.late_scatter import waits_of
+from syncline_design.auditing.late_scatter import come_at_once, long_waits_of, waits_of
 from syncline_design.auditing.result import FaultName, ResidualTime, StampFault
 from syncline_design.auditing.series import Array, Series, seconds, spread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -115,7 +115,7 @@ def _rhythm(when: Array, pace: Cadence, tick_s: float) -> Array | None:
     """When a regular sensor measured, from its own mean rhythm; None of an irregular one."""
     if when.size < 40 or when[-1] <= 0.0:
         return None
-    over = counted_over_gaps(when)
+    over = None if come_at_once(when) else counted_over_gaps(when)  # else nothing is missing
     ways = [np.arange(when.size, dtype=np.float64) if over is None else over]
     if pace.regular and 2.0 * tick_s < pace.period_s:  # with losses counted
         ways.append(np.concatenate([[0.0], np.cumsum(pace.steps)]))
@@ -132,7 +132,7 @@ def _rhythm(when: Array, pace: Cadence, tick_s: float) -> Array | None:
 
 def _keeps_to(when: Array, even: Array) -> bool:
     """Whether messages that wait for longer than an interval keep to a line: their floor does."""
-    waits = waits_of(when)
+    waits = waits_of(when) or long_waits_of(when)
     if waits is None:
         return False
     away = (when - even)[: when.size // _FLOOR * _FLOOR].reshape(-1, _FLOOR)

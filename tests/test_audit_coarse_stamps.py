@@ -1,0 +1,51 @@
+"""Arrivals late by many intervals: what stamps say of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from syncline_design.auditing.stream import Examined
+from syncline_design.machine.random_numbers import generator
+from tests.stamped_streams import of
+
+Array = NDArray[np.float64]
+LENGTH_S = 80.0
+
+
+def measured(rate_hz: float, ppm: float, first_s: float = 0.0031) -> Array:
+    return first_s + np.arange(int(LENGTH_S * rate_hz)) / rate_hz * (1.0 + 1e-6 * ppm)
+
+
+def late(count: int, seed: int) -> Array:
+    return 3e-3 + generator((51, seed)).gamma(2.0, 2e-3, count)
+
+
+def names(one: Examined) -> set[str]:
+    return {fault.fault for fault in one.faults}
+
+
+@pytest.mark.parametrize("intervals", [3.0, 8.0, 16.0])
+@pytest.mark.parametrize("rate_hz", [30.0, 100.0])
+@pytest.mark.parametrize("apart_s", [2e-7, 1e-4])
+def test_arrivals_late_by_many_intervals(rate_hz: float, intervals: float, apart_s: float) -> None:
+    """In order: most wait for one that is late, and then come at once."""
+    rng = generator((53, int(rate_hz), int(intervals)))
+    when = measured(rate_hz, 12.0)
+    waits = rng.gamma(2.0, 0.5 * intervals / rate_hz, when.size)
+    queue = apart_s * np.arange(when.size)
+    stamp = np.maximum.accumulate(when + waits - queue) + queue
+    receive = stamp + 1e-4 + rng.gamma(2.0, 8e-5, when.size)
+    one = of(stamp, np.maximum.accumulate(receive))
+    assert names(one) == {"stamped_on_arrival"}
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
+
+
+def test_events_at_random_that_come_at_once_are_not_accused() -> None:
+    """Bursts of any number after times of any length keep to no line."""
+    rng = generator((54,))
+    bursts = np.cumsum(rng.exponential(0.05, 1600))
+    sizes = rng.integers(1, 9, bursts.size)
+    when = np.sort(np.repeat(bursts, sizes) + 1e-4 * np.concatenate([np.arange(n) for n in sizes]))
+    assert names(of(when, when + 1e-4 + rng.gamma(2.0, 8e-5, when.size))) == set()
