@@ -1,4 +1,4 @@
-"""Arrivals late by many intervals: what stamps say of them."""
+"""Grids that turn once or twice, and arrivals late by many intervals: what stamps say of them."""
 
 from __future__ import annotations
 
@@ -24,6 +24,30 @@ def late(count: int, seed: int) -> Array:
 
 def names(one: Examined) -> set[str]:
     return {fault.fault for fault in one.faults}
+
+
+@pytest.mark.parametrize("ppm", [-33.0, -15.7, 21.0])
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0])
+def test_a_grid_that_turns_once_or_twice_is_no_step_and_no_lock(rate_hz: float, ppm: float) -> None:
+    """A whole number of ms, but for a sensor's ppm: one edge or two are crossed in 80 s."""
+    when = measured(rate_hz, ppm, 0.00143)
+    stamp = np.floor(when / 1e-3 + 1e-6) * 1e-3
+    one = of(stamp, np.maximum.accumulate(when + late(when.size, int(rate_hz - ppm))))
+    turns = np.round(np.abs(np.diff(stamp) - 1.0 / rate_hz) / 1e-3).sum()
+    assert names(one) == ({"truncated_stamps"} if turns > 1 else set())
+
+
+def test_a_grid_of_tens_of_milliseconds_that_turns_once_is_no_step() -> None:
+    when = measured(10.0, 16.4, 0.0093)
+    one = of(np.floor(when / 0.01 + 1e-6) * 0.01, when + late(when.size, 8))
+    assert names(one) == set()
+
+
+def test_a_step_of_one_grain_of_a_clock_that_keeps_time_is_a_step() -> None:
+    when = measured(100.0, 0.0, 0.0)
+    stamp = when + np.where(when > 31.0, 2e-3, 0.0)
+    found = of(stamp, np.maximum.accumulate(when + late(when.size, 9) / 4.0))
+    assert names(found) == {"step"}
 
 
 @pytest.mark.parametrize("intervals", [3.0, 8.0, 16.0])

@@ -6,9 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.auditing.blocks import LEAST_MESSAGES, blocks_of
 from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.coarse_rhythm import evenly
 from syncline_design.auditing.series import Array, Series, spread
+from syncline_design.machine.quick_dataclass import dataclass
 
 FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
@@ -17,6 +19,9 @@ _TURN: Final = 1.3  # grains that such a course may begin or end with
 _STRAIGHT: Final = 0.4  # of a grain: delays about the course
 _BACK: Final = 0.35  # of a grain
 _AS_FAR: Final = 0.5  # of the usual interval
+_MOST_TURNS: Final = 8  # of a sensor that hardly leaves the grid's rhythm; of others more show it
+_SURE: Final = 2.0  # sigma
+_CHANCE: Final = 0.1  # grains: what creeps by less hardly turns
 _NEXT: Final = 8  # messages on each side
 _MOST_LOST: Final = 0.15  # of all messages
 _OF_TWO: Final = 0.96  # of the intervals: one tick or two; among others messages may be lost
@@ -37,7 +42,61 @@ def alternates(series: Series, pace: Cadence, grain: int) -> bool:
         slower = skips_evenly(counts) and not _lost(series, pace, counts, grain)
         slower = slower or _sawtooth(series, pace, counts, grain)
         return slower or (evenly(np.flatnonzero(counts == 0)) and _apart(series, pace, grain))
-    return int(np.sum(near & (counts % usual != 0))) >= 3
+    if int(np.sum(near & (counts % usual != 0))) >= 3:
+        return True
+    turns = turns_of(series, pace, grain)
+    return turns is not None and turns.count >= _LEAST_TURNS and turns.shown
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Turns:
+    """Intervals of one grain more (or less) than all others, a few.
+
+    creep: by how many grains receipts run away from the others' rhythm over the log, to the side
+    that the turns make good for; off: what that is unsure by.  course: of receipts minus stamps
+    with both [grains].
+    """
+
+    count: int
+    creep: float
+    off: float
+    course: Array
+
+    @property
+    def explained(self) -> bool:
+        """Whether a sensor off the grid's rhythm may have made them: no clock need have moved."""
+        fits = abs(self.creep - self.count) < _TURN + _SURE * self.off
+        return fits and self.creep + _SURE * self.off > _CHANCE
+
+    @property
+    def shown(self) -> bool:
+        return abs(self.creep - self.count) < _TURN and self.creep > 2.0 * _SURE * self.off
+
+
+def turns_of(series: Series, pace: Cadence, grain: int) -> Turns | None:
+    """The turns of stamps on a grid of which an interval is nearly several grains, all to one
+    side; None without them."""
+    places = pace.places
+    if series.receive is None or not grain or places.size < LEAST_MESSAGES:
+        return None
+    counts = np.round(np.diff(series.stamp[places]) / grain)
+    usual = float(np.median(counts))
+    turned = counts[counts != usual] - usual
+    count = abs(float(turned.sum()))
+    if usual < 2.0 or not turned.size or count != turned.size or turned.size > _MOST_TURNS:
+        return None
+    extra = np.concatenate([[0.0], np.cumsum(counts - usual)])
+    whole = (series.receive - series.stamp)[places] / grain + extra
+    blocks = blocks_of(series.seconds[places], np.asarray(whole - whole[0]))
+    if blocks is None or blocks.usable.sum() < LEAST_MESSAGES:
+        return None
+    when, level = blocks.time_s[blocks.usable], blocks.low_s[blocks.usable]
+    slope = float(np.polynomial.polynomial.polyfit(when, level, 1)[1])
+    span = float(np.ptp(series.seconds[places]))
+    off = blocks.noise_s / (float(np.std(when)) * float(np.sqrt(when.size)))
+    creep = float(np.sign(turned[0])) * slope * span
+    course = slope * series.seconds[places] - extra
+    return Turns(int(count), creep, off * span, np.asarray(course))
 
 
 def _apart(series: Series, pace: Cadence, grain: int) -> bool:

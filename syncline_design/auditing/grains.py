@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from syncline_design.auditing.alternations import FINE, alternates, skips_evenly
+from syncline_design.auditing.alternations import FINE, alternates, skips_evenly, turns_of
 from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
@@ -27,6 +28,7 @@ _MOST_MOMENTS: Final = 200_000
 _ALONE: Final = 1.15  # ticks between messages, from which on no two of them share one
 _FAR: Final = 5.0  # ticks: what is longer is a gap or a jump
 _REACH: Final = 0.6  # of a grain, by receipts
+_TURNS: Final = 1.5  # grains
 _MOST_OF: Final = 0.9  # of what receipts of one grain lie apart
 _HALF: Final = 0.02  # how near to two messages a grain their number is
 _WIDEST: Final = 1.3  # of a tick: how far from an even rhythm stamps on ticks are
@@ -78,6 +80,20 @@ def truncated(
     if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
         return None
     return _grain(series, pace, grain)
+
+
+def without_turns(series: Series, pace: Cadence) -> tuple[Series, float]:
+    """The series without the turns of a grid that stamps lie on, whether it cut them off or not,
+    nor what these make good for; with what turns may still look like [s], 0 without them."""
+    if not pace.places.size:
+        return series, 0.0
+    grain = grain_of(series.stamp[pace.places])
+    turns = turns_of(series, pace, grain)
+    if turns is None or not turns.explained:
+        return series, 0.0
+    stamp = series.stamp.copy()
+    stamp[pace.places] += np.round(turns.course * grain).astype(np.int64)
+    return replace(series, stamp=stamp), _TURNS * grain / NS
 
 
 def _shown_by_receipts(series: Series, pace: Cadence, grain: int) -> bool:
