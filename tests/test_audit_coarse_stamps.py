@@ -1,4 +1,5 @@
-"""Grids that turn once or twice, and arrivals late by many intervals: what stamps say of them."""
+"""Timers slower than the sensor's rhythm allows to see, grids that turn once or twice, and arrivals
+late by many intervals: what stamps say of them, and what they leave open."""
 
 from __future__ import annotations
 
@@ -24,6 +25,71 @@ def late(count: int, seed: int) -> Array:
 
 def names(one: Examined) -> set[str]:
     return {fault.fault for fault in one.faults}
+
+
+def counted(one: Examined) -> float:
+    """The bound with what may hide [s]."""
+    assert one.residual.bound is not None
+    return one.residual.bound + (one.hidden.seconds if one.hidden is not None else 0.0)
+
+
+@pytest.mark.parametrize("phase_s", [0.0, 0.0113])
+@pytest.mark.parametrize(
+    ("rate_hz", "tick_s"), [(20.0, 0.04), (30.0, 0.04), (24.0, 0.04), (10.0, 0.03), (60.0, 0.0125)]
+)
+def test_ticks_whose_messages_are_received_evenly_are_packets(
+    rate_hz: float, tick_s: float, phase_s: float
+) -> None:
+    when = measured(rate_hz, 17.0)
+    stamp = np.floor((when - phase_s) / tick_s) * tick_s + phase_s
+    receive = np.maximum.accumulate(when + late(when.size, int(rate_hz)))
+    one = of(stamp, receive)
+    assert names(one) == {"packetised"}
+    assert one.faults[0].parameters["interval_s"] == pytest.approx(tick_s, rel=1e-3)
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
+
+
+@pytest.mark.parametrize(("rate_hz", "tick_s"), [(20.0, 0.04), (15.0, 0.04), (30.0, 0.04)])
+def test_ticks_that_a_count_of_messages_makes_too_are_said_and_counted(
+    rate_hz: float, tick_s: float
+) -> None:
+    """20 Hz on 40 ms, or 25 Hz without every fifth: the same two columns."""
+    when = measured(rate_hz, 17.0)
+    stamp = np.ceil(when / tick_s) * tick_s
+    receive = np.maximum.accumulate(stamp + late(when.size, int(rate_hz)))
+    one = of(stamp, receive)
+    assert names(one) <= {"duplicates"}
+    assert one.hidden is not None
+    assert "40 ms" in one.hidden.words
+    true = float(np.ptp(receive - when))
+    assert 0.97 * true < counted(one) < true + (5e-5 + 17e-6) * LENGTH_S  # two clocks' rates
+
+
+def test_ticks_that_never_repeat_themselves_are_packets() -> None:
+    """29.97 Hz on 20 ms: no count of messages leaves out so."""
+    when = measured(29.97, 9.0)
+    stamp = np.ceil((when - 0.0071) / 0.02) * 0.02 + 0.0071
+    receive = np.maximum.accumulate(stamp + late(when.size, 3))
+    one = of(stamp, receive)
+    assert names(one) == {"packetised"}
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
+
+
+@pytest.mark.parametrize("turns", [(0.03, 0.07), (0.01, 0.09), (0.05, 0.05, 0.17)])
+def test_publishers_in_turn_hide_no_ticks(turns: tuple[float, ...]) -> None:
+    when = np.cumsum(np.tile(turns, 400))
+    one = of(when, np.maximum.accumulate(when + late(when.size, 5)))
+    assert names(one) == set()
+    assert one.hidden is None
+
+
+@pytest.mark.parametrize("share", [0.02, 0.05, 0.1])
+def test_losses_at_random_hide_no_ticks(share: float) -> None:
+    when = np.arange(2000) * 0.04
+    when = when[generator((52, int(100 * share))).random(when.size) > share]
+    one = of(when, np.maximum.accumulate(when + late(when.size, 6)))
+    assert names(one) == {"lost_messages"}
+    assert one.hidden is None
 
 
 @pytest.mark.parametrize("ppm", [-33.0, -15.7, 21.0])

@@ -14,6 +14,7 @@ from syncline_design.auditing.frames import FRAMES_S, FULL_SPEED_S, Framed, fram
 from syncline_design.auditing.late_scatter import Waits, long_waits_of, waits_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Mask, Series, in_words, seconds, spread
+from syncline_design.auditing.tick_words import Paced
 from syncline_design.logs.readers.stream import PointTimes
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import signed, to_digits
@@ -110,8 +111,11 @@ class Hidden:
     words: str
 
 
-def hidden_in(series: Series, pace: Cadence) -> Hidden | None:
-    """What stamps of a stream without faults of its own cannot tell from arrivals, if anything."""
+def hidden_in(series: Series, pace: Cadence, ticks: Paced | None = None) -> Hidden | None:
+    """What stamps of a stream without faults of its own cannot tell from arrivals, if anything;
+    ticks: that they follow one another by."""
+    if ticks is not None:
+        return Hidden(ticks.hidden_s(series), ticks.words)
     if series.receive is None or pace.places.size < 40:
         return None
     when = _when(series, pace)

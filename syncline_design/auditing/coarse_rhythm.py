@@ -45,6 +45,7 @@ _BESIDE: Final = 400  # messages on each side of a hole that tell what is missin
 _SEARCH: Final = 60
 _FINER: Final = 0.1  # of a grain: by how much receipts may be late to tell more than stamps
 _LEAST_WAIT: Final = 0.2  # of an interval
+_EVENER: Final = 0.7  # of the scatter of receipts about their stamps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +74,25 @@ def counted_behind(series: Series, names: Set[FaultName], tick_s: float) -> Coun
         if by_receipts is not None:
             return replace(by_receipts, tick_s=tick_s)
     return counted(seconds(series.stamp[places] - series.stamp[places[0]]), tick_s)
+
+
+def timed_by_receipts(count: Counted, series: Series) -> Counted:
+    """Messages of packets with the interval of their receipts, where these come more evenly than
+    they follow the stamps; within a tick stamps leave many intervals open."""
+    assert series.receive is not None
+    places = series.places()
+    when = seconds(series.stamp[places] - series.stamp[places[0]])
+    came = seconds(series.receive[places] - series.receive[places[0]])
+    period = best_period(came, count.number)
+    low, high = periods_within(when, count.number, _FULL * count.tick_s)
+    even = evener(came - period * count.number, came - when)
+    return replace(count, period_s=period) if even and low <= period <= high else count
+
+
+def evener(behind: Array, late: Array) -> bool:
+    """Whether receipts keep a rhythm more closely than they follow their stamps; behind: the
+    rhythm, and the stamps [s]."""
+    return spread(behind) < _EVENER * spread(late)
 
 
 def counted(when: Array, tick_s: float) -> Counted | None:

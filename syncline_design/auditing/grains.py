@@ -11,6 +11,7 @@ from syncline_design.auditing.alternations import FINE, alternates, skips_evenly
 from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
+from syncline_design.auditing.tick_words import Paced
 from syncline_design.auditing.ticks import tick_of
 from syncline_design.logs.readers.stream import Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
@@ -166,7 +167,9 @@ def _share_ticks(interval: Array, tick: float) -> bool:
     return float(np.mean(np.clip(interval, 0.0, _FAR * tick))) < _ALONE * tick
 
 
-def packetised(series: Series, pace: Cadence, file_step_ns: float = 1.0) -> Grain | None:
+def packetised(
+    series: Series, pace: Cadence, file_step_ns: float = 1.0, told: Paced | None = None
+) -> Grain | None:
     """Stamps that come in bunches, or on the grid of a timer with a phase of its own.
 
     Without receipts only of the one timer that no scheduler has: a task of a flight controller
@@ -176,10 +179,18 @@ def packetised(series: Series, pace: Cadence, file_step_ns: float = 1.0) -> Grai
     if stamp.size < 40:
         return None
     found = _packetised(series, pace, stamp)
+    if found is None and told is not None and told.sure:
+        found = _on_ticks(series, pace, told)
     if found is not None and found.size_s * NS < _COARSE_STEPS * file_step_ns:
         return None  # ticks of what the file keeps
     known = found is not None and found.size_s == FTDI_S
     return found if series.receive is not None or known else None
+
+
+def _on_ticks(series: Series, pace: Cadence, told: Paced) -> Grain:
+    """Messages of a sensor whose rhythm waits for ticks of any length."""
+    size = max(1.0, told.tick_s / told.period_s)
+    return _packets(series, pace.interval, told.tick_s, True, size, pace)
 
 
 def _packetised(series: Series, pace: Cadence, stamp: np.ndarray) -> Grain | None:

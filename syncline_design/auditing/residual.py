@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.cadence import Cadence, cadence, counted_over_gaps
-from syncline_design.auditing.coarse_rhythm import counted_behind
+from syncline_design.auditing.coarse_rhythm import counted_behind, timed_by_receipts
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.frames import FULL_SPEED_S, TICKS_S
 from syncline_design.auditing.late_scatter import come_at_once, long_waits_of, waits_of
@@ -107,6 +107,8 @@ def _of_coarse(series: Series, when: Array, tick_s: float, names: set[FaultName]
     count = counted_behind(series, names, tick_s)
     if count is None:
         return None
+    if "packetised" in names:
+        count = timed_by_receipts(count, series)
     waits = count.waits(when)
     return np.asarray(when - waits) if float(np.ptp(waits)) < _WHOLE_TICK * tick_s else None
 

@@ -45,6 +45,7 @@ from syncline_design.auditing.stream_epochs import (
     with_epoch,
 )
 from syncline_design.auditing.stuck import without_stuck
+from syncline_design.auditing.tick_words import Paced, paced
 from syncline_design.auditing.wild_times import without_wild_times
 from syncline_design.auditing.wrong_receipts import without_wrong_receipts
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
@@ -113,7 +114,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     told = series.stamp
     series = _continuous(series, disorder, found)
     continuous = replace(series, receive=raw.receive)
-    grain = _grain(series, told, step_ns, found)
+    grain, ticks = _grain(series, told, step_ns, found)
     series = _without_arrivals(series, grain, step_ns, found)
     spikes = order.without_spikes(series)
     series = _take(_beside(disorder, spikes), found)
@@ -143,7 +144,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     found = _with_jumps(found, [*slips.faults, *moved.faults], pace.period_s)
     _last((slips.series, series), pace, stream, known, grain, found)
     found = [f for f in found if not _at_edges(f, disorder)]
-    hidden = None if _late_or_coarse(found) else arrival.hidden_in(series, pace)
+    hidden = None if _late_or_coarse(found) else arrival.hidden_in(series, pace, ticks)
     found, hidden = arrival.but_for_left_out(found, hidden, pace)
     one = _summed(stream, (raw, continuous, series), pace, found, (slips, moved), known)
     return replace(one, overtaken=disorder, copied=_copied(one), hidden=hidden)
@@ -259,14 +260,15 @@ def _at_edges(fault: StampFault, disorder: Disorder) -> bool:
 
 def _grain(
     series: Series, told: Nanoseconds, step_ns: float, found: list[StampFault]
-) -> grains.Grain | None:
+) -> tuple[grains.Grain | None, Paced | None]:
     series = without_slips(series, None).series  # whole seconds are no whole number of ticks
     pace = cadence(series)
     grain = grains.truncated(series, pace, step_ns, told)
-    grain = grain or grains.packetised(series, pace, step_ns)
+    ticks = paced(series, pace.places)
+    grain = grain or grains.packetised(series, pace, step_ns, ticks)
     if grain is not None:
         found.append(grain.fault)
-    return grain
+    return grain, ticks
 
 
 def _with_alike(series: Series, arrived: StampFault) -> StampFault:
