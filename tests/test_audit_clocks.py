@@ -336,7 +336,7 @@ def test_receipts_out_of_order_do_not_set_the_recorders_clock(
 # ---- latched messages and counters ------------------------------------------------------------
 
 
-@pytest.mark.parametrize("age", [300.0, 3600.0, 20_000.0])
+@pytest.mark.parametrize("age", [0.5, 1.5, 300.0, 3600.0, 20_000.0])
 def test_one_latched_message_may_be_old(tmp_path: Path, age: float) -> None:
     assert names(said(tmp_path, np.asarray([-age]), np.asarray([0.5]))) == []
 

@@ -238,6 +238,8 @@ def constant_fault(series: Series, known_s: float) -> StampFault | None:
         return None
     late = seconds((series.receive - series.stamp)[series.good]) + known_s
     least = float(np.percentile(late, 1.0))
+    if least > 0.0 and late.size < _TELLING:
+        return None
     whole = math.floor(least + 1e-4)
     apart = in_words(abs(least - whole))
     if 0 < abs(whole) < LARGE_SLIP_S and least - whole < _WHOLE_LATENCY_S:
@@ -246,7 +248,7 @@ def constant_fault(series: Series, known_s: float) -> StampFault | None:
             "whole_second_slip", {"seconds": float(-whole), "count": float(late.size)}, None, None,
             f"every stamp lies {abs(whole)} s {side} its receipt, but for {apart}",
         )  # fmt: skip
-    if least <= MOST_LATENCY_S or late.size < _TELLING:
+    if least <= MOST_LATENCY_S:
         return None
     return StampFault(
         "epoch_offset", {"seconds": -least, "kind": "unknown"}, None, None,
