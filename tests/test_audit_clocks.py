@@ -199,6 +199,19 @@ def fast(t: np.ndarray) -> np.ndarray:
     return t * (1 + 200e-6)
 
 
+def set_back_late(t: np.ndarray) -> np.ndarray:
+    return t - 0.1 * (t > 97.5)
+
+
+def test_a_slow_stream_has_the_step_that_the_others_show(tmp_path: Path) -> None:
+    """Twelve messages of a receiver after it, none of which falls: they seem to come too early."""
+    rows = recorded(tmp_path, set_back_late, {})
+    assert {name: names(row) for name, row in rows.items()} == {
+        name: ["recorder_clock"] for name in SENSORS
+    }
+    assert counted(rows["gnss"])[0].parameters["seconds"] == pytest.approx(0.1, rel=0.05)
+
+
 @pytest.mark.parametrize("narrow", [False, True])
 def test_a_host_that_is_slewed(tmp_path: Path, narrow: bool) -> None:
     rows = recorded(tmp_path, slewed, {}, narrow)

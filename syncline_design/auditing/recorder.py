@@ -79,6 +79,19 @@ def _shows(one: Examined, fault: StampFault) -> Shape | None:
     return None
 
 
+def _allows(one: Examined, fault: StampFault) -> Shape | None:
+    """The jump of a clock that was set back where the stream has too few messages for its level to
+    show it: they seem to be received before they were measured, from then on and by less."""
+    size, at = float(fault.parameters["seconds"]), fault.from_s or 0.0
+    for early in one.faults:
+        if early.fault != "ahead_of_receipt" or early.from_s is None:
+            continue
+        near = abs(early.from_s - at) < _NEAR_S + abs(size)
+        if near and 0.0 < float(early.parameters["seconds"]) <= size:
+            return Shape("step", -size, begin_s=at, end_s=early.to_s or at)
+    return None
+
+
 def _same(one: StampFault, other: StampFault) -> bool:
     size = float(one.parameters["seconds"])
     return one is not other and (
@@ -88,11 +101,11 @@ def _same(one: StampFault, other: StampFault) -> bool:
 
 
 def _as_said(one: Examined, said: Sequence[StampFault], start: int | None) -> Examined:
-    """A stream too slow for its receipts to fall, whose level shows the same jump."""
+    """A stream too slow for its receipts to fall, whose level shows the same jump or allows it."""
     if one.series.receive is None or any(f.fault == "recorder_clock" for f in one.faults):
         return one
     for fault in said:
-        shape = _shows(one, fault)
+        shape = _shows(one, fault) or _allows(one, fault)
         if shape is not None:
             return _again(one, _Course((shape,), 1 + len(said)), start)
     return one
