@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.coarse_rhythm import counted, evener
 from syncline_design.auditing.series import Array, Series, in_words, seconds
+from syncline_design.auditing.ticks import near_a_line
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
@@ -27,8 +28,6 @@ _NOISY: Final = 0.05  # of a tick: interrupts that come later than that hide it
 _EXACT: Final = 0.002  # of a tick: how near to whole ticks intervals are
 _SIGMA: Final = 4.0  # of what noise makes of a mean
 _OFF: Final = 0.03  # of the intervals
-_WINDOW: Final = 64  # messages over which ticks are counted
-_BALANCED: Final = 0.33  # ticks; rounding alone leaves 0.29
 _MOST_LOST: Final = 0.1  # of the rarer number: else losses explain it as well
 _REACH: Final = 1.03  # ticks
 _PERIODS: Final = 24  # messages of which a count, or a rate that is a simple part, repeats itself
@@ -112,12 +111,8 @@ def _tick_of(passed: Array) -> float | None:
 
 def _balanced(counts: Array) -> bool:
     """Whether most stretches of numbers stay near a line, as cheap to see as losses are common."""
-    number = np.concatenate([[0.0], np.cumsum(counts)])
-    windows = number[: number.size // _WINDOW * _WINDOW].reshape(-1, _WINDOW)
-    k = np.arange(_WINDOW) - 0.5 * (_WINDOW - 1)
-    slope = windows @ k / float(k @ k)
-    left = windows - windows.mean(axis=1, keepdims=True) - np.outer(slope, k)
-    return float(np.mean(np.std(left, axis=1) < _BALANCED)) > 0.5
+    near, _ = near_a_line(counts)
+    return float(np.mean(near)) > 0.5
 
 
 def _repeats(passed: Array, tick: float, interval: float) -> bool:

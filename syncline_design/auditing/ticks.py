@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.coarse_rhythm import evenly
 from syncline_design.auditing.frames import late_by, on_comb
-from syncline_design.auditing.series import Array, Series, seconds, spread
+from syncline_design.auditing.series import Array, Mask, Series, seconds, spread
 
 TICKS_S: Final = (0.016, 0.01, 0.008, 0.005, 0.004)
 _LONGEST: Final = 1.5  # of a usual interval: what holds more messages comes in bunches
@@ -54,12 +54,7 @@ def tick_of(series: Series, places: NDArray[np.intp]) -> float | None:
 
 def _by_a_line(counts: Array) -> bool:
     """Whether ticks are numbered as an even rhythm that waits for them numbers them."""
-    number = np.concatenate([[0.0], np.cumsum(counts)])
-    windows = number[: number.size // _WINDOW * _WINDOW].reshape(-1, _WINDOW)
-    k = np.arange(_WINDOW) - 0.5 * (_WINDOW - 1)
-    slope = windows @ k / float(k @ k)
-    left = windows - windows.mean(axis=1, keepdims=True) - np.outer(slope, k)
-    near = np.std(left, axis=1) < _BALANCED
+    near, slope = near_a_line(counts)
     if float(np.mean(near)) < 0.5:
         return False
     interval = float(np.median(slope))
@@ -67,6 +62,17 @@ def _by_a_line(counts: Array) -> bool:
         return True
     rare = np.flatnonzero(counts != round(interval))
     return float(np.mean(near)) > _NEAR_LINE and evenly(rare)
+
+
+def near_a_line(counts: Array) -> tuple[Mask, Array]:
+    """Which stretches of 64 messages number their ticks as an even rhythm does, to within rounding,
+    and ticks a message in each; counts: ticks between neighbours."""
+    number = np.concatenate([[0.0], np.cumsum(counts)])
+    windows = number[: number.size // _WINDOW * _WINDOW].reshape(-1, _WINDOW)
+    k = np.arange(_WINDOW) - 0.5 * (_WINDOW - 1)
+    slope = windows @ k / float(k @ k)
+    left = windows - windows.mean(axis=1, keepdims=True) - np.outer(slope, k)
+    return np.std(left, axis=1) < _BALANCED, slope
 
 
 def _on_average(when: Array, counts: Array, tick: float, noise: float) -> bool:
