@@ -62,9 +62,8 @@ def test_the_odds_are_those_of_dense_densities(seed: int) -> None:
     alone = np.log(ODD) + log_apart(odd)
     assert abs(every - alone) > 0.1  # the oracle is asked where it has an answer
     assert rather_scatters(pool, (), odd, term) == (every > alone)
-    own = np.arange(3)
-    told = odd_or_scattering._log_apart(normal, score, own, np.arange(5))
-    told -= odd_or_scattering._log_apart(normal, score, own, odd)
+    told = odd_or_scattering._log_apart(normal, score, term, np.arange(5))
+    told -= odd_or_scattering._log_apart(normal, score, term, odd)
     assert told == pytest.approx(log_apart(np.arange(5)) - log_apart(odd), abs=1e-2)
 
 

@@ -17,6 +17,7 @@ from typing import Final
 
 import numpy as np
 
+from syncline_design.campaign.parts import parts_of
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
 from syncline_design.campaign.scatter import DIFFERING, log_differing
 from syncline_design.effects.record import Array
@@ -30,21 +31,19 @@ def rather_scatters(pool: Pool, beside: Sequence[Term], odd: Index, term: Term) 
 
     beside: effects that have one value in all.
     """
-    every, own = np.arange(pool.count), np.arange(term.size)
+    every = np.arange(pool.count)
     kept = np.concatenate([term.index, *(one.index for one in beside)])
     normal, score = pool.normal[:, kept[:, None], kept], pool.score[:, kept]
-    scattering = math.log(DIFFERING) + _log_apart(normal, score, own, every)
-    return scattering > len(odd) * math.log(ODD) + _log_apart(normal, score, own, odd)
+    scattering = math.log(DIFFERING) + _log_apart(normal, score, term, every)
+    return scattering > len(odd) * math.log(ODD) + _log_apart(normal, score, term, odd)
 
 
-def _log_apart(normal: Array, score: Array, own: Index, rows: Index) -> float:
-    """log sum L of some logs, over sizes, and over the effect as a whole and its parameters one by
-    one, each of these two kinds as likely as the other.  own: the effect's parameters."""
-    parts = [own] if own.size == 1 else [own, *own[:, None]]
+def _log_apart(normal: Array, score: Array, term: Term, rows: Index) -> float:
+    """log sum L of some logs, over sizes and parts of an effect, whose parameters come first."""
     usual, prior = normal.mean(axis=0), np.zeros(normal.shape[1:])
     found = []
-    for part in parts:
-        unsure = inverted(usual[np.ix_(part, part)])
-        share = 0.0 if part.size == own.size else -math.log(own.size)
-        found.append(share + log_differing(normal, score, prior, part, unsure, SIZES, rows))
+    for part in parts_of([term]):
+        unsure = inverted(usual[np.ix_(part.own, part.own)])
+        own = log_differing(normal, score, prior, part.own, unsure, SIZES, rows)
+        found.append(part.log_share + own)
     return float(np.logaddexp.reduce(np.ravel(found)))

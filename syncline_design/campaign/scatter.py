@@ -145,14 +145,15 @@ def log_differing(
     covariances sizes^2 `usual` (p, p) about what is common, than where it is one value, (S,).
 
     normal (n, P, P), score (n, P); prior (P, P) of what is common; rows: runs that have a value of
-    their own, all of them.  With K = S (1 + N_aa S)^-1 of a
-    run, N_aa its information of the effect and s its score of it,
+    their own, None for all.  With K = S (1 + N_aa S)^-1 of a run, N_aa its information of the
+    effect and s its score of it,
         log L = sum (s' K s - log|1 + N_aa S|) / 2 + (g' T^-1 g - log|T|)' / 2 - (the same)_0 / 2,
     T and g the sums over runs, with the effect freed in each and as they are.
     """
     spreads = np.square(sizes)[:, None, None] * usual
-    apart = normal if rows is None else normal[rows]
-    across, own = apart[:, :, index], (score if rows is None else score[rows])[:, index]
+    free = slice(None) if rows is None else rows
+    apart = normal[free]
+    across, own = apart[:, :, index], score[free][:, index]
     inner = np.eye(index.size) + apart[:, index[:, None], index] @ spreads[:, None]
     kept = spreads[:, None] @ np.linalg.inv(inner)
     moved = _side_by_side(across @ kept)
