@@ -13,7 +13,7 @@ from typing import Final
 
 from syncline_design.auditing.series import NS
 from syncline_design.logs.readers.stream import UNSET, Incomplete, Nanoseconds, Stream
-from syncline_design.logs.run_parts import alike, joined
+from syncline_design.logs.run_parts import alike, streams_of
 from syncline_design.machine.quick_dataclass import dataclass
 
 _CSV: Final = "CSV"
@@ -41,6 +41,9 @@ class _Span:
     interval_s: float
 
 
+_Timed = tuple[FileStreams, _Span | None]
+
+
 def recordings(opened: Sequence[FileStreams]) -> list[list[FileStreams]]:
     """Files of one recorder: every CSV file is one stream of it, parts of a recording are one."""
     whole = _with_parts_joined(opened)
@@ -50,29 +53,24 @@ def recordings(opened: Sequence[FileStreams]) -> list[list[FileStreams]]:
 
 
 def _with_parts_joined(opened: Sequence[FileStreams]) -> list[FileStreams]:
-    spans = {id(one): _span(one) for one in opened}
-    chains: list[list[FileStreams]] = []
-    for one in sorted(opened, key=lambda one: _first(spans, one)):
-        before = next((c for c in chains if _adjoin(c[-1], one, spans)), None)
+    timed = [(one, _span(one)) for one in opened]
+    chains: list[list[_Timed]] = []
+    for one in sorted(timed, key=lambda one: 0.0 if one[1] is None else one[1].first_s):
+        before = next((chain for chain in chains if _adjoin(chain[-1], one)), None)
         if before is None:
             chains.append([one])
         else:
             before.append(one)
-    return [_one_recording(chain) for chain in chains]
+    return [_one_recording([part for part, _ in chain]) for chain in chains]
 
 
-def _first(spans: dict[int, _Span | None], one: FileStreams) -> float:
-    span = spans[id(one)]
-    return 0.0 if span is None else span.first_s
-
-
-def _adjoin(one: FileStreams, other: FileStreams, spans: dict[int, _Span | None]) -> bool:
-    before, after = spans[id(one)], spans[id(other)]
-    if before is None or after is None or one.format != other.format:
+def _adjoin(one: _Timed, other: _Timed) -> bool:
+    (before, earlier), (after, later) = one, other
+    if earlier is None or later is None or before.format != after.format:
         return False
-    apart = after.first_s - before.last_s
-    near = max(_ADJOIN_S, _INTERVALS * max(before.interval_s, after.interval_s))
-    return -_BACK_S <= apart <= near and alike(one.streams, other.streams, 1)
+    apart = later.first_s - earlier.last_s
+    near = max(_ADJOIN_S, _INTERVALS * max(earlier.interval_s, later.interval_s))
+    return -_BACK_S <= apart <= near and alike(before.streams, after.streams, 1)
 
 
 def _span(one: FileStreams) -> _Span | None:
@@ -95,9 +93,5 @@ def _one_recording(parts: Sequence[FileStreams]) -> FileStreams:
         return parts[0]
     names = ", ".join(part.path.name for part in parts[1:])
     note = f"read on from {parts[0].path.name} into {names}: parts of one recording"
-    streams: dict[str, list[Stream]] = {}
-    for part in parts:
-        for stream in part.streams:
-            streams.setdefault(stream.name, []).append(stream)
-    every = tuple(joined(of_one, note if len(of_one) > 1 else "") for of_one in streams.values())
-    return FileStreams(parts[0].path, parts[0].format, every, None)
+    streams = streams_of([part.streams for part in parts], note)
+    return FileStreams(parts[0].path, parts[0].format, streams, None)

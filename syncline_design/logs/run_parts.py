@@ -72,11 +72,7 @@ class RunParts:
         return next((p.incomplete for p in self._parts if p.incomplete is not None), None)
 
     def streams(self) -> tuple[Stream, ...]:
-        found: dict[str, list[Stream]] = {}
-        for part in self._parts:
-            for one in part.streams():
-                found.setdefault(one.name, []).append(one)
-        return tuple(joined(found[name]) for name in sorted(found))
+        return streams_of([part.streams() for part in self._parts])
 
     def samples(self, name: str) -> Iterator[Piece]:
         for part in self._parts:
@@ -126,7 +122,16 @@ def _span(recording: Recording) -> tuple[int, int]:
     return int(np.median(firsts)), int(np.median(lasts))
 
 
-def joined(parts: Sequence[Stream], note: str = "") -> Stream:
+def streams_of(parts: Sequence[Sequence[Stream]], note: str = "") -> tuple[Stream, ...]:
+    """The streams of all parts by name; note: said of each that is in several."""
+    found: dict[str, list[Stream]] = {}
+    for part in parts:
+        for one in part:
+            found.setdefault(one.name, []).append(one)
+    return tuple(_joined(found[name], note) for name in sorted(found))
+
+
+def _joined(parts: Sequence[Stream], note: str) -> Stream:
     """A stream of several parts; the notes of all, each once, and one that says so."""
     first = parts[0]
     if len(parts) == 1:
