@@ -33,7 +33,6 @@ _BOX: Final = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 _NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
 _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
-_ID: Final = re.compile(r"\b[A-Z][A-Z0-9_]*-\d+\b")  # of a requirement
 _DOT: Final = re.compile(r"(?<=[\w\]])(?=\.)")
 
 
@@ -198,7 +197,7 @@ def _is_wordy(shown: Table) -> bool:
 
 def _soft(text: str) -> str:
     """The same for an attribute that a style sheet shows."""
-    whole = _ID.sub(lambda found: found[0].replace("-", "\N{NON-BREAKING HYPHEN}"), text)
+    whole = _NAME.sub(lambda found: found[0].replace("-", "\N{NON-BREAKING HYPHEN}"), text)
     return "\N{ZERO WIDTH SPACE}".join(_STEP.split(whole))
 
 
