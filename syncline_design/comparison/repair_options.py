@@ -92,16 +92,6 @@ def applied(case: Case, remedies: Sequence[Remedy]) -> Case:
     return with_effects(case, left)
 
 
-def _proviso(finding: Finding) -> str:
-    """What a calibration rests on."""
-    if finding.within_noise is None:
-        return "it stays as it was found"
-    return (
-        f"a log of another day shows it again, for constant noise of {finding.within_noise.sensor} "
-        "would do the same"
-    )
-
-
 def compatible(remedies: Sequence[Remedy]) -> bool:
     """Whether all of them can be done: no role is to have two sensors or to be stamped two ways."""
     wanted: dict[tuple[int, str], PinnedRole] = {}
@@ -109,6 +99,16 @@ def compatible(remedies: Sequence[Remedy]) -> bool:
         wanted.setdefault((new.stage, new.role), new) == new
         for one in remedies
         for new in one.roles
+    )
+
+
+def _proviso(finding: Finding) -> str:
+    """What a calibration rests on."""
+    if finding.within_noise is None:
+        return "it stays as it was found"
+    return (
+        f"a log of another day shows it again, for constant noise of {finding.within_noise.sensor} "
+        "would do the same"
     )
 
 

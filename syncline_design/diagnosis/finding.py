@@ -108,10 +108,9 @@ def evidence_words(
 ) -> str:
     """What an effect saves, and the chance that noise alone saves as much (None: none at all).
 
-    changing: noise that stays the same over the log is not meant, for it would do the same.
-
     noise_kept: against the noise that is left with it, and not against one that is fitted anew
-    without it, which would take much of a large effect for noise.
+    without it, which would take much of a large effect for noise.  changing: noise that stays the
+    same over the log is not meant, for it would do the same.
     """
     chance = format_chance(log10_p)
     kept = " with the noise kept" if noise_kept else ""
