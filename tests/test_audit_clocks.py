@@ -203,13 +203,48 @@ def set_back_late(t: np.ndarray) -> np.ndarray:
     return t - 0.1 * (t > 97.5)
 
 
-def test_a_slow_stream_has_the_step_that_the_others_show(tmp_path: Path) -> None:
-    """Twelve messages of a receiver after it, none of which falls: they seem to come too early."""
-    rows = recorded(tmp_path, set_back_late, {})
-    assert {name: names(row) for name, row in rows.items()} == {
-        name: ["recorder_clock"] for name in SENSORS
+def set_forward_and_back(t: np.ndarray) -> np.ndarray:
+    return t + 0.08 * ((t > 40.0) & (t < 55.0))
+
+
+def set_back_and_forward(t: np.ndarray) -> np.ndarray:
+    return t - 0.05 * ((t > 40.0) & (t < 55.0))
+
+
+@pytest.mark.parametrize(
+    ("host", "sizes"),
+    [(set_back_late, [0.1]), (set_forward_and_back, [-0.08, 0.08]),
+     (set_back_and_forward, [-0.05, 0.05])],
+)  # fmt: skip
+def test_all_streams_have_one_course_of_the_recorders_clock(
+    tmp_path: Path, host: Clock, sizes: list[float]
+) -> None:
+    """Receipts of the quick ones go back, those of the slow seem to come too early: one figure."""
+    rows = recorded(tmp_path, host, {})
+    assert {name for row in rows.values() for name in names(row)} == {"recorder_clock"}
+    told = {
+        tuple(sorted(float(f.parameters["seconds"]) for f in counted(r))) for r in rows.values()
     }
-    assert counted(rows["gnss"])[0].parameters["seconds"] == pytest.approx(0.1, rel=0.05)
+    assert len(told) == 1
+    assert told.pop() == pytest.approx(sizes, rel=0.02)
+    for name, row in rows.items():
+        rate, scale = SENSORS[name]
+        t = even(rate, 100.0)
+        true = transported(t, scale, list(SENSORS).index(name)) - t
+        assert row.residual_s.bound == pytest.approx(np.ptp(true), rel=0.1)
+
+
+def test_a_stream_that_ended_before_it_has_no_step_of_the_recorder(tmp_path: Path) -> None:
+    t = even(5.0, 30.0)
+    early = written(tmp_path / "early.csv", t, transported(t, 2e-3, 9))
+    paths = [early]
+    for seed, (name, (rate, scale)) in enumerate(SENSORS.items()):
+        t = even(rate, 100.0)
+        got = set_back(transported(t, scale, seed))
+        paths.append(written(tmp_path / f"{name}.csv", t, got))
+    rows = {row.name: row for row in audit(paths).streams}
+    assert names(rows.pop("early")) == []
+    assert all(names(row) == ["recorder_clock"] for row in rows.values())
 
 
 @pytest.mark.parametrize("narrow", [False, True])

@@ -96,8 +96,8 @@ def _sets(
         faults.append(StampFault(
             "recorder_clock", {"seconds": size / NS, "kind": "step"}, float(times[fall]),
             float(times[-1]),
-            f"receipts go back by {in_words(-int(change[fall]) / NS)} and stay behind: the "
-            "recorder's clock was set",
+            f"receipts go back and stay behind by {in_words(size / NS)}: the recorder's clock was "
+            "set",
         ))  # fmt: skip
     return moved, faults
 

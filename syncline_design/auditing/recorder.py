@@ -17,10 +17,15 @@ import numpy as np
 from syncline_design.auditing.clock_shapes import Shape, straddling
 from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Array, in_words, seconds, spread
+from syncline_design.auditing.series import NS, Array, Mask, in_words, seconds, spread
+from syncline_design.auditing.set_back import (
+    SetBack,
+    received,
+    shared_set_backs,
+    times_and_lateness,
+)
 from syncline_design.auditing.shared_transport import lasting
 from syncline_design.auditing.stream import Examined, examined
-from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
@@ -40,82 +45,42 @@ _OWN: Final = 0.5  # of a size: what stamps show themselves by so much is theirs
 
 @dataclass(frozen=True, slots=True)
 class _Course:
-    """What the recorder's clock does, as receipt minus stamp; among: streams that show it."""
+    """What the recorder's clock does, as receipt minus stamp; among: streams that show it.
 
+    backs: times that it was set back, in receipts as they are; shapes: what it does besides, in
+    receipts that were put forward by these.
+    """
+
+    backs: tuple[SetBack, ...]
     shapes: tuple[Shape, ...]
-    among: int
+    among: int = 0
 
 
 def without_recorder_clock(streams: Sequence[Examined], start: int | None) -> list[Examined]:
-    """All streams examined again without what their recorder's clock did."""
+    """All streams examined again without what their recorder's clock did.
+
+    A time that it was set back shows in the receipts of quick streams alone, and is taken out of
+    all before anything else that they share is looked for.
+    """
     told = [one for one in streams if one.series.receive is not None]
     if len(told) < 2:
         return list(streams)
-    found = _shared(told)
-    if found is None:
-        said = _said(told)
-        return [_as_said(one, said, start) for one in streams]
+    backs = shared_set_backs(told)
+    once = _all_again(streams, _Course(backs, ()), start) if backs else list(streams)
+    shapes, among = _shared([one for one in once if one.series.receive is not None])
+    return _all_again(streams, _Course(backs, shapes, among), start) if shapes else once
+
+
+def _all_again(streams: Sequence[Examined], found: _Course, start: int | None) -> list[Examined]:
     return [_again(one, found, start) if one.series.receive is not None else one for one in streams]
 
 
-def _said(streams: Sequence[Examined]) -> list[StampFault]:
-    """Times that receipts of most streams were seen to go back, or their levels to jump so."""
-    every = [f for one in streams for f in one.faults if f.fault == "recorder_clock"]
-    quiet = [one for one in streams if not any(f.fault == "recorder_clock" for f in one.faults)]
-    return [
-        f for f in every
-        if 1 + sum(_same(f, g) for g in every) + sum(_shows(one, f) is not None for one in quiet)
-        > _SHARE * len(streams)
-    ]  # fmt: skip
-
-
-def _shows(one: Examined, fault: StampFault) -> Shape | None:
-    """The jump of a stream's levels that a clock that was set back makes."""
-    size, at = -float(fault.parameters["seconds"]), fault.from_s or 0.0
-    for shape in one.seen:
-        near = abs(shape.begin_s - at) < 2.0 + abs(size)
-        if shape.kind == "step" and near and abs(shape.size_s - size) < _ALIKE * abs(size):
-            return shape
-    return None
-
-
-def _allows(one: Examined, fault: StampFault) -> Shape | None:
-    """The jump of a clock that was set back where the stream has too few messages for its level to
-    show it: they seem to be received before they were measured, from then on and by less."""
-    size, at = float(fault.parameters["seconds"]), fault.from_s or 0.0
-    for early in one.faults:
-        if early.fault != "ahead_of_receipt" or early.from_s is None:
-            continue
-        near = abs(early.from_s - at) < _NEAR_S + abs(size)
-        if near and 0.0 < float(early.parameters["seconds"]) <= size:
-            return Shape("step", -size, begin_s=at, end_s=early.to_s or at)
-    return None
-
-
-def _same(one: StampFault, other: StampFault) -> bool:
-    size = float(one.parameters["seconds"])
-    return one is not other and (
-        abs(float(other.parameters["seconds"]) - size) < _ALIKE * abs(size)
-        and abs((other.from_s or 0.0) - (one.from_s or 0.0)) < 1.0 + abs(size)
-    )
-
-
-def _as_said(one: Examined, said: Sequence[StampFault], start: int | None) -> Examined:
-    """A stream too slow for its receipts to fall, whose level shows the same jump or allows it."""
-    if one.series.receive is None or any(f.fault == "recorder_clock" for f in one.faults):
-        return one
-    for fault in said:
-        shape = _shows(one, fault) or _allows(one, fault)
-        if shape is not None:
-            return _again(one, _Course((shape,), 1 + len(said)), start)
-    return one
-
-
-def _shared(streams: Sequence[Examined]) -> _Course | None:
-    """The confirmed shapes of the stream that shows most of them, the quietest first."""
+def _shared(streams: Sequence[Examined]) -> tuple[tuple[Shape, ...], int]:
+    """The confirmed shapes of the stream that shows most of them, the quietest first, and how many
+    streams show one."""
     anchors = [one for one in streams if one.blocks is not None and one.seen]
     anchors.sort(key=lambda one: one.blocks.noise_s if one.blocks is not None else 0.0)
-    best: _Course | None = None
+    best: tuple[tuple[Shape, ...], int] = (), 0
     for anchor in anchors:
         others = [one for one in streams if one is not anchor]
         mine = tuple(s for s in anchor.seen if s.kind not in ("drift", "bend"))
@@ -130,9 +95,9 @@ def _shared(streams: Sequence[Examined]) -> _Course | None:
                 kept.append(shape)
                 among = max(among, 1 + yes)
         kept = lasting(anchor.blocks, kept) if anchor.blocks is not None else kept
-        if kept and (best is None or len(kept) > len(best.shapes)):
-            best = _Course(tuple(kept), among)
-        if best is not None and len(best.shapes) == len(mine) and not rest:
+        if len(kept) > len(best[0]):
+            best = tuple(kept), among
+        if best[0] and len(best[0]) == len(mine) and not rest:
             break
     return best
 
@@ -231,41 +196,39 @@ def _again(one: Examined, found: _Course, start: int | None) -> Examined:
     stamps = one.stream.stamps
     assert stamps is not None
     assert stamps.secondary_ns is not None
-    receive = stamps.secondary_ns
-    known = (receive != UNSET) & (stamps.primary_ns != UNSET)
+    receive, known = stamps.secondary_ns, received(one)
     moved: Array = np.zeros(receive.size)
-    times = (receive[known] - one.raw.start) / NS
-    late = (receive[known] - _continuous(one)[known]) / NS
-    total: Array = np.zeros(times.size)
-    for shape in found.shapes:
-        total = total + _moved(shape, times, late)
-    moved[known] = np.round(total * NS)
+    moved[known], faults = _course_of(one, found, known)
     put_back = replace(
-        stamps, secondary_ns=np.where(known, receive - moved.astype(np.int64), receive)
+        stamps,
+        secondary_ns=np.where(known, receive - np.round(moved * NS).astype(np.int64), receive),
     )
     new = examined(replace(one.stream, stamps=put_back), start)
     residual = new.residual
     if residual.as_recorded is not None and one.residual.as_recorded is not None:
         most = max(residual.as_recorded, one.residual.as_recorded)
         residual = replace(residual, as_recorded=most)
-    end = float(one.raw.seconds[one.raw.good][-1]) if one.raw.good.any() else 0.0
     kept = tuple(f for f in new.faults if not _is_left(f, found.shapes))
-    faults = (*kept, *(_fault(shape, found.among, end) for shape in found.shapes))
     return replace(new, stream=one.stream, raw=one.raw, trace=one.trace, offset_s=one.offset_s,
-                   residual=residual, faults=faults)  # fmt: skip
+                   residual=residual, faults=(*kept, *faults))  # fmt: skip
 
 
-def _continuous(one: Examined) -> Nanoseconds:
-    """Stamps of one unit whose counters never begin anew, in the order of the file."""
-    stamps = one.stream.stamps
-    assert stamps is not None
-    assert stamps.secondary_ns is not None
-    assert one.raw.receive is not None
-    of_file = np.lexsort((stamps.primary_ns, stamps.secondary_ns))
-    of_raw = np.lexsort((one.raw.stamp, one.raw.receive))
-    found = np.empty_like(stamps.primary_ns)
-    found[of_file] = one.whole.stamp[of_raw]
-    return found
+def _course_of(one: Examined, found: _Course, known: Mask) -> tuple[Array, list[StampFault]]:
+    """By how much each receipt is moved [s], and what of it lies within the stream's time."""
+    times, late = times_and_lateness(one, known)
+    total: Array = np.zeros(times.size)
+    backs = []
+    for back in found.backs:
+        moved = _moved(back.shape, times, late - total)
+        backs += [back] if np.any(moved == 0.0) and np.any(moved != 0.0) else []
+        total = total + moved
+    forward, behind = times - total, late - total
+    end = float(forward.max()) if forward.size else 0.0
+    faults = [back.fault(end) for back in backs]
+    for shape in found.shapes:
+        total = total + _moved(shape, forward, behind)
+        faults.append(_fault(shape, found.among, end))
+    return total, faults
 
 
 def _moved(shape: Shape, times: Array, late: Array) -> Array:
@@ -281,8 +244,7 @@ def _moved(shape: Shape, times: Array, late: Array) -> Array:
     if near.size < 2:
         return shape.size_s * shape.at(times)
     first, last = int(near[0]), int(near[-1]) + 1
-    around = late[max(0, first - _BESIDE) : first]
-    level = float(np.median(around if around.size else late[last : last + _BESIDE] - shape.size_s))
+    around, level = _beside(late, first, last, shape.size_s)
     part = late[first:last] - level
     before, after = np.abs(part), np.abs(part - shape.size_s)
     cost = np.concatenate([[0.0], np.cumsum(before)])
@@ -292,6 +254,23 @@ def _moved(shape: Shape, times: Array, late: Array) -> Array:
         sure = np.minimum(before, after) < 2.0 * _TOLD * abs(shape.size_s)
         new[first:last] = np.where(sure, after < before, new[first:last])
     return np.where(new, shape.size_s, 0.0)
+
+
+def _beside(late: Array, first: int, last: int, size_s: float) -> tuple[Array, float]:
+    """Messages that tell the level before a jump between these places, and that level."""
+    if first:
+        around = late[max(0, first - _BESIDE) : first]
+        return around, float(np.median(around))
+    if last < late.size:
+        around = late[last : last + _BESIDE] - size_s
+        return around, float(np.median(around))
+    around = late[:_BESIDE]  # of which side is told by all
+    one, part = float(np.median(around)), late[:, None]
+    left = [
+        np.abs(part - (level, level + size_s)).min(axis=1).sum() for level in (one, one - size_s)
+    ]
+    level = one if left[0] <= left[1] else one - size_s
+    return around, level
 
 
 def _is_left(fault: StampFault, shapes: Sequence[Shape]) -> bool:
