@@ -22,6 +22,7 @@ from syncline_design.diagnosis.scatter import scatter, unforetold
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
+from syncline_design.logs.derivatives import derived_velocity
 from syncline_design.logs.log import Log, LogTrack, StageLog
 from syncline_design.logs.stamps import groups
 from syncline_design.machine.quick_dataclass import dataclass
@@ -80,25 +81,38 @@ def noisier_scenes(view: Scene, rng: np.random.Generator) -> tuple[Noisier, ...]
 
 
 def _noisier(log: Log, stage: Stage, own: StageLog, rng: np.random.Generator) -> StageLog:
-    """A stage's columns with as much noise again; rows of a stamp share it."""
-    group = groups(log.time_s)
+    """A stage's columns with as much noise again; rows of a stamp share it.
+
+    A velocity that was derived of the places follows theirs, so that both have the same.
+    """
     if stage.attitude is not None and log.kind != "position":
-        sizes = [
-            min(sigma, unforetold(log.time_s, np.unwrap(own.euler_rad[:, k : k + 1], axis=0)))
-            for k, sigma in enumerate(stage.attitude.sigma)
-        ]
-        drawn = rng.standard_normal((int(group[-1]) + 1, 3))[group] * np.array(sizes)
-        own = replace(own, euler_rad=own.euler_rad + drawn)
-    velocity = own.velocity_track or LogTrack(log.time_s, own.velocity_mps)
+        euler_rad = np.unwrap(own.euler_rad, axis=0)
+        added = _unforetold_again(log.time_s, euler_rad, stage.attitude.sigma, rng)
+        own = replace(own, euler_rad=own.euler_rad + added)
     rate = own.rate_track or LogTrack(log.time_s, own.rate_radps)
-    faster, turned = _scattered(velocity, rng), _scattered(rate, rng)
-    return replace(
-        own,
-        velocity_track=faster,
-        rate_track=turned,
-        velocity_mps=own.velocity_mps + _at(log.time_s, faster, velocity),
-        rate_radps=own.rate_radps + _at(log.time_s, turned, rate),
-    )
+    if own.follows_position and stage.position is not None and own.antenna_m is not None:
+        added = _unforetold_again(log.time_s, own.antenna_m, stage.position.sigma, rng)
+        place_m = own.antenna_m + added
+        velocity_mps = derived_velocity(log.time_s, place_m)
+        own = replace(own, antenna_m=place_m, velocity_mps=velocity_mps)
+    else:
+        velocity = own.velocity_track or LogTrack(log.time_s, own.velocity_mps)
+        faster = _scattered(velocity, rng)
+        velocity_mps = own.velocity_mps + _at(log.time_s, faster, velocity)
+        own = replace(own, velocity_track=faster, velocity_mps=velocity_mps)
+    turned = _scattered(rate, rng)
+    rate_radps = own.rate_radps + _at(log.time_s, turned, rate)
+    return replace(own, rate_track=turned, rate_radps=rate_radps)
+
+
+def _unforetold_again(
+    time_s: Array, column: Array, sigma: Sequence[float], rng: np.random.Generator
+) -> Array:
+    """Noise of a column (n, 3) once more: what its rows do not foretell, the spec's at most."""
+    group = groups(time_s)
+    sizes = [min(most, unforetold(time_s, column[:, k : k + 1])) for k, most in enumerate(sigma)]
+    drawn: Array = rng.standard_normal((int(group[-1]) + 1, 3))[group] * np.array(sizes)
+    return drawn
 
 
 def _scattered(track: LogTrack, rng: np.random.Generator) -> LogTrack:

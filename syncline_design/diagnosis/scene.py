@@ -16,7 +16,7 @@ import numpy as np
 
 from syncline_design.diagnosis.past import LoggedPast
 from syncline_design.diagnosis.recent import Recent
-from syncline_design.diagnosis.trajectory import LoggedMotion, pieces, smooth_slope
+from syncline_design.diagnosis.trajectory import LoggedMotion, pieces, smooth_bend, smooth_slope
 from syncline_design.diagnosis.unsettled import without_unlogged_past
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
@@ -206,6 +206,14 @@ def _logged_vector(logged: StageLog, rows: int) -> Array:
     return logged.range_m[:, None] * bearing(logged.azimuth_rad, logged.elevation_rad)
 
 
+def _acceleration(log: Log, logged: StageLog) -> Array:
+    """Of the reference point [m/s2], NED, (n, 3)."""
+    if logged.follows_position and logged.antenna_m is not None:
+        return smooth_bend(log.time_s, logged.antenna_m, log.time_s)
+    track = logged.velocity_track or LogTrack(log.time_s, logged.velocity_mps)
+    return smooth_slope(track.time_s, track.value, log.time_s)
+
+
 def _stage_rows(
     log: Log,
     logged: StageLog,
@@ -217,8 +225,6 @@ def _stage_rows(
 ) -> StageRows:
     zero = np.zeros(len(log))
     back = np.swapaxes(rotation, 1, 2)
-    track = logged.velocity_track or LogTrack(log.time_s, logged.velocity_mps)
-    acceleration = smooth_slope(track.time_s, track.value, log.time_s)
     vector = _logged_vector(logged, len(log))
     return StageRows(
         time_s=log.time_s,
@@ -226,7 +232,7 @@ def _stage_rows(
         rotation=rotation,
         euler_rad=logged.euler_rad,
         velocity_mps=rotate(back, logged.velocity_mps),
-        acceleration_mps2=rotate(back, acceleration),
+        acceleration_mps2=rotate(back, _acceleration(log, logged)),
         rate_radps=logged.rate_radps,
         range_m=zero if logged.range_m is None else logged.range_m,
         azimuth_rad=zero if logged.azimuth_rad is None else logged.azimuth_rad,

@@ -146,8 +146,11 @@ class States:
         return *sums.sums(self.block), sums.prior
 
     def within(self, inside: NDArray[np.bool_], count: int) -> States:
-        """The same with `count` blocks of the rows inside, and one on either side of them."""
+        """The same with `count` blocks of the rows inside, and one on either side of them; one
+        block alone where no row is inside."""
         rows = np.flatnonzero(inside)
+        if not rows.size:
+            return replace(self, block=np.zeros(inside.shape, dtype=np.int64), seen=None)
         count = max(min(count, rows.size // LEAST_ROWS), 1)
         block = np.zeros(inside.shape, dtype=np.int64)
         block[rows] = 1 + np.arange(rows.size) * count // rows.size

@@ -66,6 +66,11 @@ class SplinePieces:
         slopes = self.values[:, :-1] * np.array([3.0, 2.0, 1.0])[:, None]
         return self._evaluated(slopes, at_s, self._stretch(home_s))
 
+    def bend(self, at_s: Array, home_s: Array) -> Array:
+        """Second derivative of the series."""
+        bends = self.values[:, :-2] * np.array([6.0, 2.0])[:, None]
+        return self._evaluated(bends, at_s, self._stretch(home_s))
+
     def _stretch(self, home_s: Array) -> Index:
         return np.maximum(np.searchsorted(self.starts, home_s, side="right") - 1, 0)
 
@@ -138,29 +143,61 @@ def smooth_slope(time_s: Array, series: Array, at_s: Array) -> Array:
     which every second row best foretells the others, so a series without noise keeps its slope.
     Source: Craven and Wahba, Numerische Mathematik 31 (1979), for cross-validation.
     """
+    return _smooth(time_s, series, at_s, "slope")
+
+
+def smooth_bend(time_s: Array, series: Array, at_s: Array, part: Array | None = None) -> Array:
+    """Second derivative of the same splines: the acceleration of places.
+
+    That of a velocity which was itself derived of the places would be hardly smoothed at all: its
+    noise is alike from row to row, so that it foretells every second row as motion does.  part
+    (n, k): what a part of the series, as its noise, is worth in it.
+    """
+    return _smooth(time_s, series, at_s, "bend", part)
+
+
+Derivative = Literal["slope", "bend"]
+
+
+def _smooth(
+    time_s: Array, series: Array, at_s: Array, wanted: Derivative, part: Array | None = None
+) -> Array:
+    """A derivative of the series, or of a part of it by the smoothness of the whole."""
     near = np.searchsorted(at_s, time_s + NEAR_S) > np.searchsorted(at_s, time_s - NEAR_S)
-    keys = (np.ascontiguousarray(v).tobytes() for v in (time_s[near], series[near], at_s))
-    return _smooth_slope(*keys, series.shape[1]).copy()
+    taken = series if part is None else part
+    asked = (time_s[near], series[near], taken[near], at_s)
+    keys = (np.ascontiguousarray(v).tobytes() for v in asked)
+    return _smoothed(*keys, series.shape[1], wanted).copy()
 
 
 @lru_cache(maxsize=8)  # the scene of one log is set many times, each gross fault once
-def _smooth_slope(time_bytes: bytes, series_bytes: bytes, at_bytes: bytes, width: int) -> Array:
-    time_s, at_s = np.frombuffer(time_bytes), np.frombuffer(at_bytes)
-    time_s, series = per_stamp(time_s, np.frombuffer(series_bytes).reshape(-1, width))
-    slope = pieces(time_s, series).slope(at_s, at_s)
+def _smoothed(
+    time_bytes: bytes,
+    series_bytes: bytes,
+    taken_bytes: bytes,
+    at_bytes: bytes,
+    width: int,
+    wanted: Derivative,
+) -> Array:
+    rows_s, at_s = np.frombuffer(time_bytes), np.frombuffer(at_bytes)
+    time_s, series = per_stamp(rows_s, np.frombuffer(series_bytes).reshape(-1, width))
+    _, taken = per_stamp(rows_s, np.frombuffer(taken_bytes).reshape(-1, width))
+    exact = pieces(time_s, taken)
+    found = (exact.slope if wanted == "slope" else exact.bend)(at_s, at_s)
     step = np.diff(time_s)
     cuts = np.flatnonzero(step > GAP_FACTOR * np.median(step)) + 1
     bounds = [0, *cuts.tolist(), time_s.shape[0]]
     longest = max(pairwise(bounds), key=lambda ends: ends[1] - ends[0])
     chosen = slice(longest[0], min(longest[1], longest[0] + MOST_TRIED))
     for k in range(width):
-        found = penalty(time_s[chosen], series[chosen, k])
-        for a, b in pairwise(bounds) if found else ():
+        lam = penalty(time_s[chosen], series[chosen, k])
+        for a, b in pairwise(bounds) if lam else ():
             own = (at_s >= time_s[a]) & (at_s <= time_s[b - 1])
             if b - a >= LEAST_SMOOTHED and np.any(own):
                 smooth = Smoothing(time_s[a:b], at_s[own])
-                slope[own, k] = smooth.slopes(series[a:b, k], found)
-    return slope
+                of = smooth.slopes if wanted == "slope" else smooth.bends
+                found[own, k] = of(taken[a:b, k], lam)
+    return found
 
 
 @dataclass(frozen=True, slots=True)

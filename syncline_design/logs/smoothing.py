@@ -71,6 +71,12 @@ class Smoothing:
         found: Array = straight - self.step[at] / 6.0 * curved
         return found
 
+    def bends(self, series: Array, lam: float) -> Array:
+        """Its second derivative there."""
+        _, bend = self._fitted(series, lam)
+        found: Array = (1.0 - self.off) * bend[self.at] + self.off * bend[self.at + 1]
+        return found
+
     def _fitted(self, series: Array, lam: float) -> tuple[Array, Array]:
         """Values and second derivatives at the stamps."""
         from scipy.linalg import solveh_banded
