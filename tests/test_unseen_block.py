@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from syncline_design.diagnosis.fitting import fit
 from syncline_design.diagnosis.remainder import Remainder, remainder
 from syncline_design.diagnosis.run import _started
 from syncline_design.diagnosis.search import SearchResult
+from syncline_design.diagnosis.spans import StampSpan
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.unseen_block import unseen_block
 from syncline_design.logs.log import Log
@@ -84,6 +86,10 @@ def test_what_the_rest_does_not_bear_out_goes(tmp_path: Path) -> None:
     claimed = fit(search.data, [bias.acting({"bias_m": 0.02})])
     assert claimed.labels == (bias.label,)
     assert search.confirmed(claimed).labels == ()
+    late = float(search.data.view.log.time_s[-1]) + 1.0  # only in a block that was held out
+    part = replace(claimed.acting[0], effect=StampSpan(bias.effect, late, late + 5.0).cut)
+    elsewhere = fit(search.data, [part])
+    assert search.confirmed(elsewhere).labels == ()
 
 
 def left_in(log: WorldLog, folder: Path) -> Remainder:

@@ -28,6 +28,7 @@ from syncline_design.diagnosis.proposals import Label, Proposals
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.settling import Settled, borne_out, settle
 from syncline_design.diagnosis.slow_states import States, fitted_of, slow_states
+from syncline_design.diagnosis.spans import acts_at
 from syncline_design.diagnosis.trials import (
     plausible,
 )
@@ -102,9 +103,12 @@ class Search:
     def confirmed(self, found: Model) -> Model:
         """The effects of a model of other rows as far as these rows bear them out, and what else.
 
-        Each is fitted and tested here; those that do not stand go, then the search goes on.
+        Each is fitted and tested here; those that do not stand go, then the search goes on.  One
+        cut to a stretch of which no row is here says nothing of these rows, and goes first.
         """
-        model = fit(self.data, found.acting, found.opened, start=found.level)
+        time_s = self.data.view.log.time_s
+        here = [one for one in found.acting if acts_at(one.effect, time_s)]
+        model = fit(self.data, here, found.opened, start=found.level)
         tried = self.proposals
         model = borne_out(self.data, model, self.states, tried.threshold_at, tried.stands)
         return self.grown(model, model)[1]

@@ -62,6 +62,12 @@ def span_of(effect: Effect) -> StampSpan | None:
     return own if isinstance(own, StampSpan) else None
 
 
+def acts_at(effect: Effect, time_s: Array) -> bool:
+    """Whether an effect that may be cut to a stretch acts at any of these stamps."""
+    span = span_of(effect)
+    return span is None or bool(np.any(span.mask(time_s)))
+
+
 def cut_to(span: StampSpan, found: Signature, time_s: Array) -> Signature:
     """Another effect's signature in the same stretch."""
     one = found.candidate
