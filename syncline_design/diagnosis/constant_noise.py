@@ -2,8 +2,9 @@
 
 A sensor whose every reading is off by one and the same c standard deviations makes the error
     L(t) c,  L (n, 3, r) what one standard deviation of each of its readings does [m].
-An effect whose error e is that, for some c of at most one, is within what the spec lets the sensor
-be wrong by: a log in which the sensor's error never changes cannot tell the two apart.
+An effect whose error e is that is within what the spec lets the sensor be wrong by where c is no
+rarer than RARE: noise that never changes has c ~ N(0, 1) in every reading, and |c|^2 is chi-square
+of r.  A log in which the sensor's error never changes cannot tell the two apart.
 """
 
 from __future__ import annotations
@@ -17,14 +18,15 @@ from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data
 from syncline_design.diagnosis.result import WithinNoise
 from syncline_design.effects.record import Array
+from syncline_design.model.distributions import chi_square_beyond
 
 LEFT: Final = 0.2  # of an effect's RMS that may be left: as little as does not matter
-MOST: Final = 1.0  # standard deviations
+RARE: Final = 0.05  # of logs whose noise never changes, in which it is as large
 
 
 def within_noise(data: Data, made: Array) -> WithinNoise | None:
-    """The sensor whose constant error makes an effect's error (n, 3) [m] with the least of its
-    standard deviations; None where none does."""
+    """The sensor whose constant error most often makes an effect's error (n, 3) [m] or a larger
+    one; None where none does."""
     known = compared(data)
     right = np.where(known, made, 0.0).ravel()
     whole = float(np.linalg.norm(right))
@@ -34,6 +36,7 @@ def within_noise(data: Data, made: Array) -> WithinNoise | None:
         share, *_ = np.linalg.lstsq(columns, right, rcond=None)
         left = float(np.linalg.norm(right - columns @ share))
         most = float(np.max(np.abs(share)))
-        if left <= LEFT * whole and 0.0 < most <= MOST:
-            found.append(WithinNoise(stage, sensor, most))
-    return min(found, key=lambda one: one.sigmas, default=None)
+        chance = chi_square_beyond(float(share @ share), len(share))
+        if left <= LEFT * whole and most > 0.0 and chance >= RARE:
+            found.append(WithinNoise(stage, sensor, most, chance))
+    return max(found, key=lambda one: one.chance, default=None)

@@ -99,12 +99,14 @@ class Stretch(Record):
 
 @dataclass(frozen=True, slots=True)
 class WithinNoise(Record):
-    """The sensor whose noise, the same over the whole log, would do what an effect does, and at how
-    many of the spec's standard deviations of the reading that needs most."""
+    """The sensor whose noise, the same over the whole log, would do what an effect does, at how
+    many of the spec's standard deviations of the reading that needs most, and in what share of logs
+    noise that never changes is as large."""
 
     stage: str
     sensor: str
     sigmas: float
+    chance: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -133,7 +133,8 @@ def _figures_of(one: Finding) -> str:
 def _noise_instead(noise: WithinNoise) -> str:
     return (
         f"It cannot be told from noise of {noise.sensor} that stays the same over the whole log: "
-        f"{numbers.number(noise.sigmas, 2)} times the spec's standard deviation does the same."
+        f"{numbers.number(noise.sigmas, 2)} times the spec's standard deviation does the same, "
+        f"and such noise is as large in {numbers.percent(noise.chance, 2)} of logs."
     )
 
 
