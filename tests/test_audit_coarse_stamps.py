@@ -75,6 +75,45 @@ def test_ticks_that_never_repeat_themselves_are_packets() -> None:
     assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
 
 
+def spread_late(count: int, seed: int) -> Array:
+    """Delays that reach over more than a grain of 20 ms."""
+    return 0.02 + generator((53, seed)).gamma(2.0, 4e-3, count)
+
+
+@pytest.mark.parametrize("rate_hz", [15.0, 30.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_sensor_that_measures_on_a_grid_cuts_nothing_off(rate_hz: float, seed: int) -> None:
+    """Nothing tells it from ticks of a timer: said, and the bound holds both."""
+    schedule = measured(rate_hz, 17.0)
+    when = np.ceil(schedule / 0.02) * 0.02
+    receive = np.maximum.accumulate(when + spread_late(when.size, seed))
+    one = of(when, receive)
+    assert names(one) == set()
+    assert one.hidden is not None
+    for true in (receive - when, receive - schedule):
+        assert counted(one) > 0.97 * float(np.ptp(true))
+
+
+@pytest.mark.parametrize("rate_hz", [12.0, 15.0, 23.7, 30.0])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_stamps_that_were_cut_off_are_told_by_what_receipts_keep(rate_hz: float, seed: int) -> None:
+    when = measured(rate_hz, 17.0)
+    receive = np.maximum.accumulate(when + spread_late(when.size, seed))
+    one = of(np.floor(when / 0.02) * 0.02, receive)
+    assert names(one) == {"truncated_stamps"}
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
+
+
+def test_ticks_whose_receipts_are_spread_are_no_cut_off_stamps() -> None:
+    """29.97 Hz on the host's own 20 ms."""
+    when = measured(29.97, 9.0)
+    stamp = np.ceil(when / 0.02) * 0.02
+    receive = np.maximum.accumulate(stamp + spread_late(when.size, 3))
+    one = of(stamp, receive)
+    assert names(one) == {"packetised"}
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)
+
+
 @pytest.mark.parametrize("turns", [(0.03, 0.07), (0.01, 0.09), (0.05, 0.05, 0.17)])
 def test_publishers_in_turn_hide_no_ticks(turns: tuple[float, ...]) -> None:
     when = np.cumsum(np.tile(turns, 400))

@@ -11,7 +11,7 @@ from syncline_design.auditing.alternations import FINE, alternates, skips_evenly
 from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
-from syncline_design.auditing.tick_words import Paced
+from syncline_design.auditing.tick_words import Paced, followed
 from syncline_design.auditing.ticks import tick_of
 from syncline_design.logs.readers.stream import Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
@@ -80,7 +80,7 @@ def truncated(
         return None
     if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
         return None
-    return _grain(series, pace, grain)
+    return None if followed(series, pace.places, grain / NS) else _grain(series, pace, grain)
 
 
 def without_turns(series: Series, pace: Cadence) -> tuple[Series, float]:

@@ -92,6 +92,29 @@ def paced(series: Series, places: NDArray[np.intp]) -> Paced | None:
     return Paced(tick, count.period_s, places, waits, repeats, evener(late + waits, late))
 
 
+def followed(series: Series, places: NDArray[np.intp], grain_s: float) -> bool:
+    """Whether messages come after their stamps on a grid as if they had been measured there.
+
+    Of a rhythm a + k T, w = s - a - k T and delays d: cut-off stamps leave r - s = d - w, those of
+    messages that were measured or taken at s leave d.  So r - s changes from message to message by
+    what delays do less what w does, or by the first alone: the likelihoods of both, of delays whose
+    changes are Laplace's (sums of absolute values), apart by more than chance makes them.
+    """
+    if series.receive is None:
+        return False
+    when = seconds(series.stamp[places] - series.stamp[places[0]])
+    count = counted(when, grain_s)
+    if count is None:
+        return False
+    waits = count.waits(when)
+    if float(np.ptp(waits)) > _REACH * grain_s:
+        return False
+    moved, late = np.diff(waits), np.diff(seconds((series.receive - series.stamp)[places]))
+    nearer = np.abs(late + moved) - np.abs(late)  # to what was measured there, positive
+    chance = float(np.std(nearer)) * float(np.sqrt(nearer.size))
+    return float(nearer.sum()) > _SIGMA * chance > 0.0
+
+
 def _tick_of(passed: Array) -> float | None:
     """What intervals of two kinds differ by, where both are whole numbers of it."""
     low, high = np.percentile(passed, [_RARE, 100.0 - _RARE])
