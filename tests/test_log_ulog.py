@@ -54,6 +54,24 @@ def test_a_flight_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert streams["vehicle_local_position[0]"].nature == "fused"
 
 
+def test_utc_is_held_against_when_a_receiver_measured(tmp_path: Path) -> None:
+    """Its message was published 60 ms later, which is no part of UTC - boot."""
+    boot_us, utc_us = 12_345_678, 1_764_000_000_500_000
+    names = "uint64_t timestamp;uint64_t timestamp_sample;uint64_t time_utc_usec"
+    records = [ulog_record("F", f"sensor_gps:{names}".encode())]
+    records.append(ulog_record("A", struct.pack("<BH", 0, 0) + b"sensor_gps"))
+    for k in range(20):
+        measured, utc = boot_us + 200_000 * k, utc_us + 200_000 * k
+        row = struct.pack("<QQQ", measured + 60_000, measured, utc)
+        records.append(ulog_record("D", struct.pack("<H", 0) + row))
+    path = tmp_path / "a.ulg"
+    path.write_bytes(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 1) + b"".join(records))
+    (gnss,) = open_recording(path).streams()
+    offset = (utc_us - boot_us) / 1e6
+    wanted = f"UTC - boot = {offset:.6f} s (median of 20, spread 0.0 ms, by timestamp_sample)"
+    assert any(wanted in note for note in gnss.notes), gnss.notes
+
+
 def test_formats_within_formats_and_sections_behind_the_end(tmp_path: Path) -> None:
     """Arrays of formats, trailing padding that is not there, and data appended after a crash."""
     formats = ("inner:uint8_t a;uint8_t[3] _padding0;float b",

@@ -21,7 +21,6 @@ from syncline_design.logs.readers.reader import BY_MAGIC, NO, FileHead, Reader
 from syncline_design.logs.readers.stream import (
     UNSET,
     Incomplete,
-    Nanoseconds,
     Piece,
     StampColumn,
     Stamps,
@@ -78,7 +77,7 @@ class _Topic:
     layout: Layout
     published: StampColumn = field(default_factory=StampColumn)
     sampled: StampColumn = field(default_factory=StampColumn)
-    utc: list[tuple[int, int]] = field(default_factory=list)
+    utc: list[tuple[int, int]] = field(default_factory=list)  # which message, and what it tells
     utc_unset: int = 0
     messages: int = 0
 
@@ -295,7 +294,7 @@ def _count(topic: _Topic, data: bytes) -> None:
         if utc < EARLIEST_NS:
             topic.utc_unset += 1
         elif stamp != UNSET and len(topic.utc) < MOST_UTC:
-            topic.utc.append((stamp, utc))
+            topic.utc.append((topic.messages - 1, utc))
 
 
 def _stream(topic: _Topic, partial: bool) -> Stream:
@@ -311,7 +310,7 @@ def _stream(topic: _Topic, partial: bool) -> Stream:
         else Stamps(SAMPLE, STAMP, sampled, published)
     )
     meaning = meaning_of(topic.kind, topic.layout.fields)
-    notes += _clock_notes(topic, stamps.primary_ns)
+    notes += _clock_notes(topic, stamps)
     if meaning is not None:
         notes += meaning.notes
     return Stream(
@@ -330,21 +329,28 @@ def _stream(topic: _Topic, partial: bool) -> Stream:
     )
 
 
-def _clock_notes(topic: _Topic, stamps: Nanoseconds) -> list[str]:
-    """How boot and UTC stand to each other, as far as the topic tells."""
-    known = stamps[(stamps != UNSET) & (stamps != 0)]
+def _clock_notes(topic: _Topic, stamps: Stamps) -> list[str]:
+    """How boot and UTC stand to each other, as far as the topic tells.
+
+    A receiver's UTC is of when it measured, as the stamps that stand for its messages are: held
+    against those of publication it would be less by what lies between.
+    """
+    boot = stamps.primary_ns
+    known = boot[(boot != UNSET) & (boot != 0)]
     notes = []
     if known.shape[0] and int(np.median(known)) > EARLIEST_NS:
         notes.append("the boot clock itself runs on Unix time (a simulation)")
-    if topic.utc:
-        apart = np.array([utc - stamp for stamp, utc in topic.utc], dtype=np.int64)
+    apart = np.array(
+        [u - int(boot[k]) for k, u in topic.utc if boot[k] not in (0, UNSET)], dtype=np.int64
+    )
+    if apart.size:
         middle = int(apart[0]) + round(float(np.median(apart - apart[0])))
         seconds, micro = divmod((middle + 500) // 1000, 10**6)
         spread = (int(apart.max()) - int(apart.min())) / 1e6
         first, last = calendar(topic.utc[0][1]), calendar(topic.utc[-1][1])
         notes.append(
-            f"UTC - boot = {seconds}.{micro:06d} s (median of {len(topic.utc)}, "
-            f"spread {to_places(spread, 1)} ms); UTC {first} to {last}"
+            f"UTC - boot = {seconds}.{micro:06d} s (median of {apart.size}, "
+            f"spread {to_places(spread, 1)} ms, by {stamps.primary}); UTC {first} to {last}"
         )
     if topic.utc_unset:
         notes.append(f"{topic.utc_unset} messages without UTC: no fix yet")
