@@ -149,6 +149,33 @@ def test_metadata_that_nest_absurdly_do_not_crash(tmp_path: Path) -> None:
         open_recording(folder(tmp_path / "other", b"[" * 60 + b"]" * 60))
 
 
+def of_aliases(levels: int) -> bytes:
+    """A list of ten lists of ten lists ..., each told once."""
+    told = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
+    told += [f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]" for k in range(1, levels)]
+    files = f"rosbag2_bagfile_information:\n  relative_file_paths: [*a{levels - 1}]"
+    return "\n".join([*told, files]).encode()
+
+
+@pytest.mark.parametrize(
+    ("metadata", "words"),
+    [
+        (of_aliases(9), "the names of the bag's files as a list of text"),
+        (b"- a\n- b\n", "no rosbag2_bagfile_information"),
+        (b"rosbag2_bagfile_information: [a]\n", "no relative_file_paths"),
+        (b"rosbag2_bagfile_information:\n  relative_file_paths: 5\n", "as a list of text"),
+    ],
+)
+def test_metadata_of_another_kind_are_refused_in_words(
+    tmp_path: Path, metadata: bytes, words: str
+) -> None:
+    """Nine levels of aliases stand for 1e9 names."""
+    with pytest.raises(BadInput) as refused:
+        open_recording(folder(tmp_path / "bag", metadata))
+    assert words in str(refused.value)
+    assert "indices" not in str(refused.value)
+
+
 @pytest.mark.parametrize("which", ["metadata.yaml", "bag_1.db3"])
 def test_a_pipe_in_a_bag_is_not_waited_for(tmp_path: Path, which: str) -> None:
     named = b"rosbag2_bagfile_information:\n  relative_file_paths: [bag_0.db3, bag_1.db3]\n"

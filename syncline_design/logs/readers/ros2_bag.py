@@ -7,7 +7,7 @@ import sqlite3
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 from urllib.parse import quote
 
 from syncline_design.logs.readers.mcap_file import MAGIC as MCAP_MAGIC
@@ -27,6 +27,7 @@ from syncline_design.machine.deadline import in_force
 MAGIC = b"SQLite format 3\x00"
 FORMAT = "ROS 2 bag"
 METADATA = "metadata.yaml"
+_FILES_AT: Final = ("rosbag2_bagfile_information", "relative_file_paths")
 MOST_METADATA = 1 << 24
 MOST_MESSAGE = 1 << 28
 MOST_FILES = 10_000
@@ -109,12 +110,26 @@ def _named(path: Path) -> list[str]:
         loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
         if _depth_of(yaml.parse(text, loader)) > MOST_NESTED:
             raise refuse(path, "no metadata of a bag", expected=f"at most {MOST_NESTED} levels")
-        data = yaml.load(text, loader)
-        files = data["rosbag2_bagfile_information"]["relative_file_paths"]
-        return [str(name) for name in files]
-    except (OSError, yaml.YAMLError, KeyError, TypeError, RecursionError) as error:
+        return _files_told(path, yaml.load(text, loader))
+    except (OSError, yaml.YAMLError, RecursionError) as error:
         short = (str(error).splitlines() or [type(error).__name__])[0][:160]
         raise refuse(path, "no metadata of a bag", found=short) from None
+
+
+def _files_told(path: Path, data: Any) -> list[str]:
+    """The names of a bag's files; one alias in another stands for a list without end, so that
+    nothing but text is taken."""
+    for depth, key in enumerate(_FILES_AT, 1):
+        if not isinstance(data, dict) or key not in data:
+            wanted = ": ".join(_FILES_AT[:depth])
+            raise refuse(path, "no metadata of a bag", expected=wanted, found=f"no {key}")
+        data = data[key]
+    if isinstance(data, list) and all(isinstance(name, str) for name in data):
+        return data
+    wanted = "the names of the bag's files as a list of text"
+    raise refuse(
+        path, "no metadata of a bag", expected=wanted, found=f"{_FILES_AT[-1]} of another kind"
+    )
 
 
 def _depth_of(events: Iterable[Any]) -> int:
