@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from syncline_design.diagnosis import diagnose
-from syncline_design.diagnosis.gross import gross_faults
+from syncline_design.diagnosis.gross import Gross, gross_faults
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.effects.kinematics import euler_to_rotation
 from syncline_design.logs.log import Log
@@ -92,6 +92,18 @@ def plus(column: str, value: float, sign: float = 1.0) -> Fault:
     return fault
 
 
+def exchanged(*pairs: tuple[str, str]) -> Fault:
+    """Columns under each other's name."""
+
+    def fault(log: Columns) -> None:
+        for one, other in pairs:
+            log[one], log[other] = log[other], log[one]
+
+    return fault
+
+
+UPRIGHT = (("position", "m"), ("velocity", "mps"), ("target", "m"))
+PLACES = tuple(zip(names("position"), names("target"), strict=True))
 EVERYTHING = together(
     held(names("position"), SWAP), held(names("velocity", "mps"), SWAP), held(names("target"), SWAP)
 )
@@ -111,6 +123,38 @@ FAULTS: dict[str, tuple[Fault, str]] = {
         "world axes west-north-down, body axes forward-left-up",
     ),
     "from the zenith": (plus("elevation_deg", 90.0, -1.0), "elevation from the zenith"),
+    "bearings exchanged": (
+        exchanged(("azimuth_deg", "elevation_deg")),
+        "azimuth and elevation under each other's name",
+    ),
+    "roll, pitch exchanged": (
+        exchanged(("roll_deg", "pitch_deg")),
+        "roll and pitch under each other's name",
+    ),
+    "yaw, roll exchanged": (
+        exchanged(("roll_deg", "yaw_deg")),
+        "roll and yaw under each other's name",
+    ),
+    "places exchanged": (
+        exchanged(*PLACES),
+        "the position and the target under each other's name",
+    ),
+    "heights of all up": (
+        together(*(scaled([f"{one}_down_{u}"], -1.0) for one, u in UPRIGHT)),
+        "north-east-up (position, velocity and target alike)",
+    ),
+    "yaw in radians": (
+        scaled(["yaw_deg"], np.pi / 180.0),
+        "radians for degrees in yaw alone",
+    ),
+    "elevation in mrad": (
+        scaled(["elevation_deg"], 1e3 * np.pi / 180.0),
+        "milliradians for degrees in elevation alone",
+    ),
+    "azimuth in radians": (
+        scaled(["azimuth_deg"], np.pi / 180.0),
+        "radians for degrees in azimuth alone",
+    ),
     "azimuth + 90": (plus("azimuth_deg", 90.0), "azimuth off by 90 deg"),
 }
 SHIFTS = {
@@ -184,7 +228,7 @@ def test_a_clean_log_and_a_large_lever_arm_are_no_convention() -> None:
     assert not gross_of(longer)
 
 
-def gross_of(fault: Fault | None) -> tuple[object, ...]:
+def gross_of(fault: Fault | None) -> tuple[Gross, ...]:
     inputs = read(spoilt(fault))
     return gross_faults(inputs.system, inputs.log, inputs.known)[0]
 
@@ -203,6 +247,11 @@ def test_a_fault_that_no_spec_holds_stays_out_of_it() -> None:
     assert found.effects_entries() == ()
 
 
+def test_columns_under_each_others_name_are_said_so() -> None:
+    (one,) = gross_of(FAULTS["bearings exchanged"][0])
+    assert one.sentence == "The columns of azimuth and elevation are under each other's name"
+
+
 def test_two_faults_are_found_of_which_the_greater_hides_the_unit() -> None:
     """East-north-up places and ranges in mm: in cm, the ranges would leave less than in mm."""
 
@@ -217,3 +266,39 @@ def test_two_faults_are_found_of_which_the_greater_hides_the_unit() -> None:
     true, other = true_log(), mended.stages[0]
     assert other.range_m == pytest.approx(true.stages[0].range_m, abs=1e-3)
     assert other.antenna_m == pytest.approx(true.stages[0].antenna_m, abs=1e-3)
+
+
+REFERENCE = names("reference")
+
+
+def beside_a_reference(sign: float, scatter_m: float = 0.0) -> Fault:
+    """A position log: the antenna's arm beside the reference, times a sign, and noise of places."""
+
+    def fault(log: Columns) -> None:
+        angles = np.radians(np.array([log[name] for name in ANGLES]).T)
+        arm = (
+            sign
+            * euler_to_rotation(angles)
+            @ np.array(clean().run.carriers[0].sensors.antenna_arm_m)
+        )
+        noise = scatter_m * np.random.default_rng(5).standard_normal(arm.shape)
+        for k, name in enumerate(names("position")):
+            log[REFERENCE[k]] = log[name] - arm[:, k]
+            log[name] = log[name] + noise[:, k]
+        for name in ("range_m", "azimuth_deg", "elevation_deg", "target_id", *names("target")):
+            log.pop(name, None)
+
+    return fault
+
+
+def test_a_lever_arm_of_the_wrong_sign_turns_no_world_round() -> None:
+    """The error would be the same with all of the world south-west-up, or places exchanged."""
+    assert not gross_of(beside_a_reference(-1.0))
+
+
+def test_a_reference_that_scatters_like_a_receiver_is_called_so() -> None:
+    exchange = exchanged(*zip(names("position"), REFERENCE, strict=True))
+    (one,) = gross_of(together(beside_a_reference(1.0, 0.1), exchange))
+    assert one.sentence == (
+        "The columns of the position and the reference are under each other's name"
+    )

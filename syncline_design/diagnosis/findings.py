@@ -177,9 +177,10 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     gain = math.log(fault.falls_by)
     words = f"undoing it makes the usual error {_times_smaller(fault.falls_by)}"
     named = finding(effect, label[1], stage, found, words + _of_a_clock(view, fault), gain)
-    if not fault.readings:
-        return named
-    return replace(named, sentence=f"{named.sentence}, in {fault.readings} alone")
+    sentence = fault.sentence or named.sentence
+    if fault.readings:
+        sentence = f"{sentence}, in {fault.readings} alone"
+    return replace(named, sentence=sentence)
 
 
 def _of_gross(value: float | str, spread: float | None, unit: str) -> Estimate:

@@ -8,6 +8,7 @@ bring the error down to a tenth, or to a third where nothing but noise is left.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -20,6 +21,7 @@ from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.slips import StampShift, attitude_restamped, best_shifts
 from syncline_design.effects import plain_delay, registry
 from syncline_design.effects.acting import Acting
+from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import ActsOn, Array, Effect
 from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
 from syncline_design.logs.merging import hermite
@@ -43,6 +45,7 @@ MEMORY_SHARES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)  # time constants over the 
 SHORT_SHIFT_S = 0.5  # a shorter shift of stamps is a latency, to be fitted
 MOST_DELAY_S = 0.25  # that a slip may have beside it
 NEARLY_FREE = 2.0  # the same for what is searched
+SAME = 1.0 + 1e-9  # times the least error: as little
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
 
 Reread = Callable[[float], Log]
@@ -56,6 +59,7 @@ class Gross:
     falls_by: float  # usual size of the error before over after
     spread: float | None = None  # standard uncertainty of its parameter
     readings: str = ""  # of the sensor's, those that it acts on alone
+    sentence: str = ""  # for people, where the effect's own says it worse
 
 
 def undone(log: Log, one: Acting) -> Log:
@@ -194,7 +198,7 @@ class _Looking:
                 best = self._best_of(log, base, (size, expected_m), taken)
             if best is None:
                 return tuple(found), log, size / max(expected_m, 1e-300)
-            found.append(Gross(best.acting, size / max(best.size_m, 1e-300)))
+            found.append(_taken(best, size))
             log = best.mend(log)
 
     def _best_of(
@@ -217,7 +221,8 @@ class _Looking:
         if not _clear(shift, size, expected_m):
             shift = None
         listed, shift = (_unless_smoothed(one, base, self.exclude) for one in (listed, shift))
-        return _preferred(_preferred(listed, shift), wide)
+        best = _preferred(_preferred(listed, shift), wide)
+        return None if best is None or NO_WORSE * _arm_leaves(base) < best.size_m else best
 
     def _listed(
         self, log: Log, base: Scene, taken: Sequence[tuple[str, str, int]]
@@ -230,15 +235,27 @@ class _Looking:
         What leaves least alone is undone, and what is best then is looked for behind it.
         """
         base = self.base(log)
+        if _arm_leaves(base) < NEARLY_FREE * expected_size(base):
+            return None
         size = usual_size(base.error())
         trials = [*self._listed(log, base, ()), *_searched(self.system, log, base, self.exclude)]
         tried = sorted((_tried_out(t) for t in trials), key=lambda one: one.size_m)
         for one in [t for t in tried[:BEAM] if t.size_m < NO_WORSE * size]:
-            first = Gross(one.acting, size / max(one.size_m, 1e-300))
+            first = _taken(one, size)
             found, left, over = self.down(one.mend(log), (first,))
             if len(found) > 1 and over < NEARLY_FREE:
                 return found, left
         return None
+
+
+def _arm_leaves(base: Scene) -> float:
+    """The usual error of a position log [m] with the best arm; of others none is tried."""
+    rotation, error = base.rows[0].rotation, base.error()
+    known = np.all(np.isfinite(error), axis=1)
+    if base.log.kind != "position" or not np.any(known):
+        return math.inf
+    arm_m = np.median(rotate(np.swapaxes(rotation[known], 1, 2), error[known]), axis=0)
+    return usual_size(error - rotate(rotation, arm_m))
 
 
 def _unless_smoothed(tried: _Tried | None, base: Scene, exclude: Sequence[str]) -> _Tried | None:
@@ -288,8 +305,10 @@ def _clear(best: _Tried | None, size_m: float, expected_m: float) -> bool:
 
 
 def _best(trials: Sequence[GrossTrial]) -> _Tried | None:
-    """The trial of least error, the first of equals."""
-    return min(map(_tried_out, trials), key=lambda one: one.size_m, default=None)
+    """The trial of least error, the first of equals: some differ by rounding alone."""
+    tried = [_tried_out(t) for t in trials]
+    least = min((one.size_m for one in tried), default=0.0)
+    return next((one for one in tried if one.size_m <= SAME * least), None)
 
 
 def _again(one: Acting, taken: Sequence[Acting]) -> bool:
@@ -300,7 +319,7 @@ def _again(one: Acting, taken: Sequence[Acting]) -> bool:
 
 
 def _tried_out(trial: GrossTrial) -> _Tried:
-    return _Tried(trial.acting, trial.mend, usual_size(trial.error()))
+    return _Tried(trial.acting, trial.mend, usual_size(trial.error()), trial.sentence)
 
 
 def _is_short_slip(one: Acting) -> bool:
@@ -336,6 +355,7 @@ class GrossTrial:
     acting: Acting
     error: Callable[[], Array]
     mend: Callable[[Log], Log]
+    sentence: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,6 +365,13 @@ class _Tried:
     acting: Acting
     mend: Callable[[Log], Log]
     size_m: float
+    sentence: str = ""
+
+
+def _taken(best: _Tried, size_m: float) -> Gross:
+    """A fault that was tried, of a log with so large a usual error."""
+    falls_by = size_m / max(best.size_m, 1e-300)
+    return Gross(best.acting, falls_by, sentence=best.sentence)
 
 
 def _trials(
@@ -371,7 +398,8 @@ def _searched(system: System, log: Log, base: Scene, exclude: Sequence[str]) -> 
     effect = _undone(by_mending=True)
     for one in best_conventions(system, base.log) if effect.name not in exclude else []:
         acting = Acting(effect, one.sensor, 0, {"convention": one.convention})  # type: ignore[dict-item]
-        found.append(GrossTrial(acting, partial(_error, system, log, base, one.mend), one.mend))
+        error = partial(_error, system, log, base, one.mend)
+        found.append(GrossTrial(acting, error, one.mend, one.sentence))
     return found
 
 
