@@ -248,6 +248,24 @@ def _angle_units(names: Sequence[str]) -> Iterator[tuple[Array, str, int]]:
                 yield factors, words, 1 if whole else count
 
 
+def yaw_quarter(off_deg: float) -> Convention:
+    """The yaw that is off by a quarter turn, or by half a turn."""
+    return _of_angles(np.ones(3), -off_deg, f"yaw off by {to_places(off_deg, 0)} deg")
+
+
+def attitude_signs() -> Iterator[Convention]:
+    """One, two or all of roll, pitch and yaw turned round."""
+    for signs in itertools.product((1.0, -1.0), repeat=3):
+        names = [name for name, sign in zip(EULER, signs, strict=True) if sign < 0.0]
+        if names:
+            yield _of_angles(np.array(signs), 0.0, f"{' and '.join(names)} turned round")
+
+
+def _of_angles(scale: Array, turn_deg: float, words: str) -> Convention:
+    turn = np.array([0.0, 0.0, math.radians(turn_deg)])
+    return Convention("attitude", words, angles_mended(partial(_scaled, scale=scale, turn=turn)), 1)
+
+
 def _scaled(held: Array, scale: Array, turn: Array) -> Array:
     return held * scale + turn
 

@@ -176,6 +176,7 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     stage = view.system.stages[label[2]].name
     gain = math.log(fault.falls_by)
     words = f"undoing it makes the usual error {_times_smaller(fault.falls_by)}"
+    words += f"; {fault.witness}" if fault.witness else ""
     named = finding(effect, label[1], stage, found, words + _of_a_clock(view, fault), gain)
     sentence = fault.sentence or named.sentence
     if fault.readings:

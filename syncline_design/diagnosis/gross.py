@@ -9,23 +9,30 @@ bring the error down to a tenth, or to a third where nothing but noise is left.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from syncline_design.diagnosis.conventions import best_conventions, is_of_unit
-from syncline_design.diagnosis.expected_noise import structure_of
+from syncline_design.diagnosis.borne_out import borne_out
+from syncline_design.diagnosis.conventions import is_of_unit
+from syncline_design.diagnosis.gross_trials import (
+    ROWS,
+    SHORT_SLIP,
+    GrossTrial,
+    convention_acting,
+    expected_size,
+    listed_trials,
+    searched_trials,
+    shift_trials,
+    usual_size,
+)
+from syncline_design.diagnosis.mending import Reread, restamps, value_of
 from syncline_design.diagnosis.scene import Scene, scene
-from syncline_design.diagnosis.slips import StampShift, attitude_restamped, best_shifts
-from syncline_design.effects import plain_delay, registry
+from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import rotate
-from syncline_design.effects.record import ActsOn, Array, Effect
-from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
-from syncline_design.logs.merging import hermite
-from syncline_design.logs.stamps import per_stamp
+from syncline_design.effects.record import Effect
+from syncline_design.logs.log import Log
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 
@@ -35,20 +42,13 @@ MOST = 3  # gross faults at once
 HUGE = 40.0  # times the expected size, from which two faults at once are looked for
 NO_WORSE = 1.1  # times the error, that the first of them may leave
 BEAM = 8  # first faults behind which another one is looked for
-ROWS = 3000
-LEAST_LEFT = 10  # rows
 WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
-SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of seconds
 SEARCHED_TO = 0.1  # what is searched so widely has to help so much
 FAR_BETTER = 0.5  # of the error of the best fault of the list
 MEMORY_SHARES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)  # time constants over the shift of stamps
-SHORT_SHIFT_S = 0.5  # a shorter shift of stamps is a latency, to be fitted
-MOST_DELAY_S = 0.25  # that a slip may have beside it
 NEARLY_FREE = 2.0  # the same for what is searched
 SAME = 1.0 + 1e-9  # times the least error: as little
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
-
-Reread = Callable[[float], Log]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,81 +60,7 @@ class Gross:
     spread: float | None = None  # standard uncertainty of its parameter
     readings: str = ""  # of the sensor's, those that it acts on alone
     sentence: str = ""  # for people, where the effect's own says it worse
-
-
-def undone(log: Log, one: Acting) -> Log:
-    """The log with a sensor's columns brought back to the package's conventions."""
-    undoing = one.effect.undoing
-    assert undoing is not None
-    assert undoing.mend is not None
-    old, convention = log.stages[one.stage], str(_value(one))
-    if one.sensor == "position":
-        if old.antenna_m is None:  # a later stage's place is the stage before's reading
-            return log
-        new = replace(old, antenna_m=undoing.mend(old.antenna_m, one.sensor, convention))
-    elif one.sensor == "attitude":
-        new = replace(old, euler_rad=undoing.mend(old.euler_rad, one.sensor, convention))
-    else:
-        assert old.azimuth_rad is not None
-        assert old.elevation_rad is not None
-        held = np.stack([old.azimuth_rad, old.elevation_rad], axis=-1)
-        azimuth, elevation = undoing.mend(held, one.sensor, convention).T
-        new = replace(old, azimuth_rad=azimuth, elevation_rad=elevation)
-    stages = tuple(new if k == one.stage else s for k, s in enumerate(log.stages))
-    return replace(log, stages=stages)
-
-
-def _value(one: Acting) -> str | float:
-    """The value of a discrete effect's one parameter."""
-    return one.values[one.effect.parameters[0].name]
-
-
-def unslipped(log: Log, seconds: float) -> Log:
-    """The log with every position paired with the rows it belongs to.
-
-    stamp = true + seconds, so the position that was true at t carries the stamp t + seconds.  Rows
-    whose position lies beyond the log or in a gap are left out; where that is nearly all of them
-    (windows of a very long log shorter than the slip), the log stays as it is.
-    """
-    first = log.stages[0]
-    assert first.antenna_m is not None
-    times, antenna = per_stamp(log.time_s, first.antenna_m)
-    wanted = log.time_s + seconds
-    right = np.clip(np.searchsorted(times, wanted), 1, times.shape[0] - 1)
-    step = times[right] - times[right - 1]
-    inside = (wanted >= times[0]) & (wanted <= times[-1]) & (step <= GAP_FACTOR * log.interval_s)
-    if np.count_nonzero(inside) < LEAST_LEFT:
-        return log
-    track = first.velocity_track or LogTrack(*per_stamp(log.time_s, first.velocity_mps))
-    moved = [
-        hermite(
-            times,
-            antenna[:, k],
-            np.interp(times - seconds, track.time_s, track.value[:, k]),
-            wanted,
-            right,
-        )
-        for k in range(3)
-    ]
-    stages = (replace(first, antenna_m=np.stack(moved, axis=1)), *log.stages[1:])
-    return replace(log, stages=stages).rows(inside)
-
-
-def mended(log: Log, one: Acting, reread: Reread | None = None) -> Log:
-    """The log with a listed gross fault undone."""
-    if not _restamps(one):
-        return undone(log, one)
-    return restamped(log, float(_value(one)), reread)
-
-
-def restamped(log: Log, seconds: float, reread: Reread | None = None) -> Log:
-    """The log with its positions' stamps set back, by pairing rows anew or reading anew."""
-    return unslipped(log, seconds) if reread is None else reread(seconds)
-
-
-def _restamps(one: Acting) -> bool:
-    """Whether it is undone by pairing rows anew, not by mending columns."""
-    return one.effect.undoing is not None and one.effect.undoing.mend is None
+    witness: str = ""  # what of the log's motion bears it out, where its error alone could not
 
 
 def gross_faults(
@@ -154,17 +80,6 @@ def gross_faults(
     if over > FAR_FROM_NOISE and look.over(log) > HUGE:
         return look.pair(log) or (found, left)
     return found, left
-
-
-def expected_size(view: Scene) -> float:
-    """Usual length of the error vector [m] that the spec's noise makes on the log as it is.
-
-    A range in millimetres makes the noise of its bearing a thousand times as large.
-    """
-    structure = structure_of(view)
-    variance = sum(np.einsum("nii->ni", w.covariance) for w in structure.white)
-    visible = np.isfinite(view.log.truth_m)
-    return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,10 +107,11 @@ class _Looking:
         while True:
             base = self.base(log)
             size, expected_m = usual_size(base.error()), expected_size(base)
-            best = None
+            best, taken = None, [g.acting for g in found]
             if len(found) < MOST and size > FAR_FROM_NOISE * expected_m:
-                taken = [g.acting for g in found]
                 best = self._best_of(log, base, (size, expected_m), taken)
+            if len(found) < MOST and best is None:
+                best = self._borne_out(log, base, taken)
             if best is None:
                 return tuple(found), log, size / max(expected_m, 1e-300)
             found.append(_taken(best, size))
@@ -213,9 +129,9 @@ class _Looking:
         listed = _best(self._listed(log, base, [one.label for one in taken]))
         if not _clear(listed, size, expected_m):
             listed = None
-        searched = _searched(self.system, log, base, self.exclude)
+        searched = searched_trials(self.system, log, base, self.exclude)
         wide = _best([t for t in searched if not _again(t.acting, taken)])
-        shift = _best(_shifts(self.system, log, base, self.exclude, self.reread))
+        shift = _best(shift_trials(self.system, log, base, self.exclude, self.reread))
         if wide is not None and not _far_down(wide.size_m, size, expected_m):
             wide = None
         if not _clear(shift, size, expected_m):
@@ -224,10 +140,21 @@ class _Looking:
         best = _preferred(_preferred(listed, shift), wide)
         return None if best is None or NO_WORSE * _arm_leaves(base) < best.size_m else best
 
+    def _borne_out(self, log: Log, base: Scene, taken: Sequence[Acting]) -> _Tried | None:
+        """What is too small beside the noise to be searched for, but shows in the motion too."""
+        found = borne_out(self.system, log, base)
+        if found is None:
+            return None
+        one = found.convention
+        acting = convention_acting(one)
+        if acting.effect.name in self.exclude or _again(acting, taken):
+            return None
+        return _Tried(acting, one.mend, found.size_m, one.sentence, found.witness)
+
     def _listed(
         self, log: Log, base: Scene, taken: Sequence[tuple[str, str, int]]
     ) -> list[GrossTrial]:
-        return _trials(self.system, log, base, taken, self.exclude, self.reread)
+        return listed_trials(self.system, log, base, taken, self.exclude, self.reread)
 
     def pair(self, log: Log) -> tuple[tuple[Gross, ...], Log] | None:
         """Faults of which the first helps little alone, where all together leave nothing but noise.
@@ -238,7 +165,10 @@ class _Looking:
         if _arm_leaves(base) < NEARLY_FREE * expected_size(base):
             return None
         size = usual_size(base.error())
-        trials = [*self._listed(log, base, ()), *_searched(self.system, log, base, self.exclude)]
+        trials = [
+            *self._listed(log, base, ()),
+            *searched_trials(self.system, log, base, self.exclude),
+        ]
         tried = sorted((_tried_out(t) for t in trials), key=lambda one: one.size_m)
         for one in [t for t in tried[:BEAM] if t.size_m < NO_WORSE * size]:
             first = _taken(one, size)
@@ -265,7 +195,7 @@ def _unless_smoothed(tried: _Tried | None, base: Scene, exclude: Sequence[str]) 
     """
     if tried is None or tried.acting.sensor != "position" or not _is_shift(tried.acting):
         return tried
-    around_s = abs(float(_value(tried.acting)))
+    around_s = abs(float(value_of(tried.acting)))
     sizes = [
         usual_size(base.error((Acting(effect, "position", 0, {effect.memory: share * around_s}),)))
         for effect in registry().values()
@@ -278,7 +208,7 @@ def _unless_smoothed(tried: _Tried | None, base: Scene, exclude: Sequence[str]) 
 
 def _is_shift(one: Acting) -> bool:
     """Whether it moves stamps, by whole seconds or not."""
-    return _restamps(one) or one.effect.undoing is None
+    return restamps(one) or one.effect.undoing is None
 
 
 def _far_down(left_m: float, size_m: float, expected_m: float) -> bool:
@@ -298,9 +228,9 @@ def _preferred(listed: _Tried | None, wide: _Tried | None) -> _Tried | None:
 def _clear(best: _Tried | None, size_m: float, expected_m: float) -> bool:
     if best is None or not best.size_m < FALLS_TO * size_m:
         return False
-    if _restamps(best.acting):
+    if restamps(best.acting):
         return not _is_short_slip(best.acting) or best.size_m < NEARLY_NOISE * expected_m
-    short = best.acting.effect.undoing is None and abs(float(_value(best.acting))) <= SHORT_SLIP
+    short = best.acting.effect.undoing is None and abs(float(value_of(best.acting))) <= SHORT_SLIP
     return not short or best.size_m < NEARLY_FREE * expected_m
 
 
@@ -313,8 +243,8 @@ def _best(trials: Sequence[GrossTrial]) -> _Tried | None:
 
 def _again(one: Acting, taken: Sequence[Acting]) -> bool:
     """Whether a convention was undone already, or another unit of the same column."""
-    value = str(_value(one))
-    before = [str(_value(other)) for other in taken if other.label == one.label]
+    value = str(value_of(one))
+    before = [str(value_of(other)) for other in taken if other.label == one.label]
     return value in before or (is_of_unit(value) and any(map(is_of_unit, before)))
 
 
@@ -323,7 +253,7 @@ def _tried_out(trial: GrossTrial) -> _Tried:
 
 
 def _is_short_slip(one: Acting) -> bool:
-    return _restamps(one) and abs(float(_value(one))) <= SHORT_SLIP
+    return restamps(one) and abs(float(value_of(one))) <= SHORT_SLIP
 
 
 def whole_seconds(found: Acting, uncertainty: float) -> Acting | None:
@@ -331,7 +261,7 @@ def whole_seconds(found: Acting, uncertainty: float) -> Acting | None:
     slip = _instead_of(found)
     if slip is None:
         return None
-    value = float(_value(found))
+    value = float(value_of(found))
     whole = float(round(value))
     if not whole or not abs(value - whole) < max(3.0 * uncertainty, WHOLE_S):
         return None
@@ -349,16 +279,6 @@ def _instead_of(found: Acting) -> Effect | None:
 
 
 @dataclass(frozen=True, slots=True)
-class GrossTrial:
-    """A gross fault to be tried: the error of the log with it undone, and how to undo it."""
-
-    acting: Acting
-    error: Callable[[], Array]
-    mend: Callable[[Log], Log]
-    sentence: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class _Tried:
     """A trial made: the usual error of the log with the fault undone."""
 
@@ -366,108 +286,10 @@ class _Tried:
     mend: Callable[[Log], Log]
     size_m: float
     sentence: str = ""
+    witness: str = ""
 
 
 def _taken(best: _Tried, size_m: float) -> Gross:
     """A fault that was tried, of a log with so large a usual error."""
     falls_by = size_m / max(best.size_m, 1e-300)
-    return Gross(best.acting, falls_by, sentence=best.sentence)
-
-
-def _trials(
-    system: System,
-    log: Log,
-    base: Scene,
-    taken: Sequence[tuple[str, str, int]],
-    exclude: Sequence[str],
-    reread: Reread | None,
-) -> list[GrossTrial]:
-    """Every listed gross fault with a function that re-simulates the log under it."""
-    faults = [e for e in registry().values() if e.undoing is not None and e.name not in exclude]
-    return [
-        GrossTrial(one, _resimulated(system, base, one), partial(mended, one=one, reread=reread))
-        for effect in faults
-        for one in _tried(system, log, effect)
-        if one.label not in taken
-    ]
-
-
-def _searched(system: System, log: Log, base: Scene, exclude: Sequence[str]) -> list[GrossTrial]:
-    """The best of all conventions, to be re-simulated."""
-    found = []
-    effect = _undone(by_mending=True)
-    for one in best_conventions(system, base.log) if effect.name not in exclude else []:
-        acting = Acting(effect, one.sensor, 0, {"convention": one.convention})  # type: ignore[dict-item]
-        error = partial(_error, system, log, base, one.mend)
-        found.append(GrossTrial(acting, error, one.mend, one.sentence))
-    return found
-
-
-def _error(system: System, log: Log, base: Scene, mend: Callable[[Log], Log]) -> Array:
-    """The error of a log once mended."""
-    left = mend(log)
-    thin = left.rows(slice(None, None, max(1, len(left) // ROWS)))
-    return scene(system, thin, base.known).error()
-
-
-def _shifts(
-    system: System, log: Log, base: Scene, exclude: Sequence[str], reread: Reread | None
-) -> list[GrossTrial]:
-    """The best shifts of stamps."""
-    found = []
-    for shift in best_shifts(system, log):
-        acting = _shift_named(shift)
-        if acting.effect.name not in exclude and abs(shift.seconds) > SHORT_SHIFT_S:
-            seconds = float(next(iter(acting.values.values())))
-            mend = partial(_shifted, sensor=shift.sensor, seconds=seconds, reread=reread)
-            found.append(GrossTrial(acting, partial(_error, system, log, base, mend), mend))
-    return found
-
-
-def _shift_named(shift: StampShift) -> Acting:
-    """Whole seconds are a slip where a sensor can have one, a delay beside it; else a delay."""
-    whole = float(round(shift.seconds))
-    slip = _undone(by_mending=False)
-    beside = abs(shift.seconds - whole) <= MOST_DELAY_S and abs(whole) > SHORT_SLIP
-    slipped = shift.sensor in slip.sensors and (shift.whole or beside)
-    effect = slip if slipped else plain_delay()
-    seconds = whole if slipped or shift.whole else shift.seconds
-    return Acting(effect, shift.sensor, 0, {effect.parameters[0].name: seconds})
-
-
-def _undone(*, by_mending: bool) -> Effect:
-    """The one discrete effect that a log is freed of by mending columns, or by pairing anew."""
-    return next(
-        one for one in registry().values()
-        if one.undoing is not None and (one.undoing.mend is not None) == by_mending
-    )  # fmt: skip
-
-
-def _shifted(log: Log, sensor: ActsOn, seconds: float, reread: Reread | None) -> Log:
-    if sensor == "attitude":
-        return attitude_restamped(log, seconds)
-    return restamped(log, seconds, reread)
-
-
-def _tried(system: System, log: Log, effect: Effect) -> Iterator[Acting]:
-    """A discrete effect with every value, at every sensor that a log of this kind holds."""
-    assert effect.undoing is not None
-    name = effect.parameters[0].name
-    for k, stage in enumerate(system.stages):
-        for sensor, values in effect.undoing.tried.items():
-            held = log.kind != "position" or sensor != "ranging"
-            if held and effect.applies(stage, sensor):
-                # a convention's value is its name
-                yield from (Acting(effect, sensor, k, {name: v}) for v in values)  # type: ignore[dict-item]
-
-
-def _resimulated(system: System, base: Scene, one: Acting) -> Callable[[], Array]:
-    if _restamps(one):
-        return lambda: base.error((one,))
-    return lambda: scene(system, undone(base.log, one), base.known).error()
-
-
-def usual_size(error: Array) -> float:
-    """Median length of the error vector [m]; components without a truth count as zero."""
-    length = np.sqrt(np.nansum(error**2, axis=1))
-    return float(np.median(length))
+    return Gross(best.acting, falls_by, sentence=best.sentence, witness=best.witness)

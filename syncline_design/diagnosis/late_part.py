@@ -25,7 +25,8 @@ import numpy as np
 from syncline_design.diagnosis.candidates import candidates, plain_signatures
 from syncline_design.diagnosis.fitting import inner
 from syncline_design.diagnosis.frozen_channels import euler_rates
-from syncline_design.diagnosis.gross import Gross, expected_size, usual_size
+from syncline_design.diagnosis.gross import Gross
+from syncline_design.diagnosis.gross_trials import expected_size, usual_size
 from syncline_design.diagnosis.judged import log_f
 from syncline_design.diagnosis.late_rows import acting_late
 from syncline_design.diagnosis.looked_up import Mask, Weighed

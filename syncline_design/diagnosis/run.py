@@ -24,9 +24,11 @@ from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, wind
 from syncline_design.diagnosis.free_frame import with_free_frame
 from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
-from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
+from syncline_design.diagnosis.gross import Gross, gross_faults, whole_seconds
+from syncline_design.diagnosis.gross_trials import usual_size
 from syncline_design.diagnosis.identify import unseen
 from syncline_design.diagnosis.late_part import is_far_off, late_part
+from syncline_design.diagnosis.mending import mended
 from syncline_design.diagnosis.motion_columns import (
     columns_of,
     contradictions,

@@ -28,6 +28,7 @@ from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.derivatives import derived_velocity
 from syncline_design.logs.log import Log, StageLog
 
+EULER = ("roll", "pitch", "yaw")
 NED = ("north", "east", "down")
 ROUGHER = 2.0  # times as rough as the places of the better system are those that are measured
 
@@ -45,15 +46,21 @@ def _named(sensor: ActsOn, names: Sequence[str]) -> partial[Convention]:
     return partial(Convention, sensor, words, work=1, sentence=sentence)
 
 
+def angles_exchanged() -> Iterator[Convention]:
+    """Two of roll, pitch and yaw under each other's name."""
+    for names, order in _exchanges(EULER, 0):
+        yield _named("attitude", names)(mend=angles_mended(partial(_ordered, order=order)))
+
+
 def _attitudes(parts: Parts) -> Iterator[Convention]:
     off = parts.antenna - parts.target
     before = euler_to_rotation(parts.euler)[:, 2, 2]
-    for names, order in _exchanges(("roll", "pitch", "yaw"), 0):
+    orders = (order for _, order in _exchanges(EULER, 0))
+    for one, order in zip(angles_exchanged(), orders, strict=True):
         rotation = euler_to_rotation(parts.euler[:, order])
         size = size_of(off + rotate(rotation, parts.vector))
         upright = bool(np.median(rotation[:, 2, 2]) > 0.0) or not np.median(before) > 0.0
-        mend = angles_mended(partial(_ordered, order=order))
-        yield _named("attitude", names)(mend=mend, size_m=size, upright=upright)
+        yield replace(one, size_m=size, upright=upright)
 
 
 def _bearings(parts: Parts) -> Iterator[Convention]:

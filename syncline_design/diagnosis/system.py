@@ -8,8 +8,8 @@ from pathlib import Path
 
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.problem import build_problem, sole_design
-from syncline_design.diagnosis.gross import Reread, mended
 from syncline_design.diagnosis.level import demand_level
+from syncline_design.diagnosis.mending import Reread, mended
 from syncline_design.effects.acting import Acting, acting_of
 from syncline_design.logs.columns import ISO_TIMES, known_names, shown
 from syncline_design.logs.given_once import demand_once
