@@ -17,7 +17,7 @@ from syncline_design.report.document import Document, Outcome, Text, pins, secti
 from syncline_design.report.on_acceptance import assumptions_table
 from syncline_design.report.render_html import html
 from syncline_design.report.studies import render_study
-from syncline_design.report.table import table
+from syncline_design.report.table import Cell, table
 from syncline_design.studies import StudySettings, run_study
 
 WIDE, PHONE = {"width": 1300, "height": 900}, {"width": 420, "height": 900}
@@ -147,3 +147,50 @@ def test_room_is_kept_for_words_alone(browser: Any, tmp_path: Path, last: str, l
     with Opened(browser, path, viewport={"width": 768, "height": 900}) as opened:
         width = "e => { const w = getComputedStyle(e).minWidth; return w === 'auto' ? '0px' : w; }"
         assert opened.page.eval_on_selector("tbody td:last-child", width) == least
+
+
+def test_no_line_of_the_banner_ends_in_a_name_or_before_a_unit() -> None:
+    told = Outcome("bad", "x", "Does not meet, waiver of SYNC-1 expired")
+    shown = html(Document("x", told, "Five centimetres from 100 m", (), (), ()))
+    assert '<span class="whole">SYNC-1</span>' in shown
+    assert "Five centimetres from 100\u00a0m" in Page(shown).text
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("viewport", [PHONE, {"width": 768, "height": 900}, WIDE])
+def test_long_words_break_before_a_table_goes_on_sideways(
+    browser: Any, tmp_path: Path, viewport: dict[str, int]
+) -> None:
+    """A file's hash, the address of a source: a column of a few letters each would be cut."""
+    path = tmp_path / "page.html"
+    hashes = [[Cell("recordings/of_the_third_day.mcap", code=True), Cell("0f" * 32, code=True)]]
+    sources = [["gpio", "see https://example.org/" + "documentation" * 7 + " (mean 6.92 us)"]]
+    shown = page(*show(table("a", ("File", "SHA-256"), hashes)),
+                 *show(table("b", ("Entry", "Source"), sources)))  # fmt: skip
+    path.write_text(shown, "utf-8")
+    beyond = "all => all.map(e => e.scrollWidth - e.clientWidth)"
+    with Opened(browser, path, viewport=viewport) as opened:
+        assert opened.page.eval_on_selector_all(".scroll", beyond) == [0, 0]
+        assert opened.page.query_selector(".more") is None
+
+
+@pytest.mark.browser
+def test_a_table_that_would_just_be_cut_stands_closer(browser: Any, tmp_path: Path) -> None:
+    """And apart again where there is room."""
+    path = tmp_path / "page.html"
+    heads = tuple(f"Head{k}" for k in range(9))
+    path.write_text(page(*show(table("x", heads, [["-1234.5678 m"] * 9] * 70))), "utf-8")
+    closer = "() => document.querySelector('.scroll').classList.contains('tight')"
+    cut = "e => e.scrollWidth > e.clientWidth + 1"
+    with Opened(browser, path, viewport={"width": 2000, "height": 900}) as opened:
+        seen = []
+        for width in range(1300, 700, -20):
+            opened.page.set_viewport_size({"width": width, "height": 900})
+            opened.page.wait_for_timeout(30)
+            seen.append(
+                (opened.page.evaluate(closer), opened.page.eval_on_selector(".scroll", cut))
+            )
+        assert (True, False) in seen
+        assert (False, True) not in seen
+        opened.page.set_viewport_size({"width": 1300, "height": 900})
+        opened.page.wait_for_function(f"!({closer})()")

@@ -50,12 +50,15 @@
     table.setAttribute("role", "table");
   });
 
-  // A table that goes on beyond its frame stands as cards on a phone, or says so.
+  // A table that goes on beyond its frame stands as cards on a phone, or closer, or says so.
   var phone = window.matchMedia("(max-width: 34rem)");
   function cut(frame) { return frame.scrollWidth > frame.clientWidth + 1; }
   function hint(frame) {
     var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 60;
-    if (phone.matches && few && cut(frame)) { frame.classList.add("cards"); }
+    frame.classList.remove("tight");
+    if (frame.dataset.turned) { frame.classList.remove("cards"); }
+    if (phone.matches && few && cut(frame)) { frame.classList.add("cards"); frame.dataset.turned = "yes"; }
+    if (cut(frame)) { frame.classList.add("tight"); }
     frame.classList.toggle("more", cut(frame));
     frame.classList.toggle("down", frame.matches(".inner, .long") && frame.scrollHeight > frame.clientHeight + 1);
   }
@@ -64,6 +67,7 @@
     var watch = new ResizeObserver(function (seen) { seen.forEach(function (one) { hint(one.target); }); });
     frames.forEach(function (frame) { watch.observe(frame); });
   } else { frames.forEach(hint); }
+  window.addEventListener("load", function () { frames.forEach(hint); });
 
   // A list of sections that goes on beyond the window says so.
   var sections = document.querySelector("nav ul");

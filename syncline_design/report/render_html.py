@@ -104,6 +104,7 @@ def _environment() -> Environment:
     environment.tests["few"] = lambda shown: _lines(shown) <= _FEW
     environment.filters["dated"] = dated
     environment.filters["whole"] = _whole
+    environment.filters["printed"] = _printed
     environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
     environment.filters["points"] = _points
