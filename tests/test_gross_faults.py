@@ -113,6 +113,18 @@ FAULTS: dict[str, tuple[Fault, str]] = {
     "axes permuted": (held(names("position"), np.eye(3)[[1, 2, 0]]), "east-down-north"),
     "one mirrored": (held(names("position"), np.diag([1.0, -1.0, 1.0])), "north-west-down"),
     "height up": (held(names("position"), np.diag([1.0, 1.0, -1.0])), "up"),
+    "height up, so is the velocity": (
+        together(*(scaled([f"{one}_down_{u}"], -1.0) for one, u in UPRIGHT[:2])),
+        "up",
+    ),
+    "places and velocity in ENU": (
+        together(held(names("position"), SWAP), held(names("velocity", "mps"), SWAP)),
+        "enu",
+    ),
+    "places and velocity in cm": (
+        together(scaled(names("position"), 100.0), scaled(names("velocity", "mps"), 100.0)),
+        "in cm",
+    ),
     "ranges in mm": (scaled(["range_m"], 1000.0), "range in mm"),
     "radians": (scaled(list(ANGLES), np.pi / 180.0), "radians"),
     "ENU, y left": (attitude(SWAP, LEFT_UP), "enu"),
@@ -250,6 +262,12 @@ def test_a_fault_that_no_spec_holds_stays_out_of_it() -> None:
 def test_columns_under_each_others_name_are_said_so() -> None:
     (one,) = gross_of(FAULTS["bearings exchanged"][0])
     assert one.sentence == "The columns of azimuth and elevation are under each other's name"
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_velocities_are_turned_with_the_places_where_they_fit(alike: bool) -> None:
+    (one,) = gross_of(FAULTS["height up, so is the velocity" if alike else "height up"][0])
+    assert one.velocity_alike is alike
 
 
 def test_two_faults_are_found_of_which_the_greater_hides_the_unit() -> None:

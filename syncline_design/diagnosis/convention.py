@@ -98,7 +98,7 @@ def antenna_turned(back: Array) -> Mend:
     def changed(held: StageLog) -> StageLog:
         assert held.antenna_m is not None
         placed = replace(held, antenna_m=held.antenna_m @ back.T)
-        return _velocity(placed, back) if held.follows_position else placed
+        return velocity_turned(placed, back) if held.follows_position else placed
 
     return lambda log: first_changed(log, changed)
 
@@ -112,12 +112,12 @@ def everything_turned(back: Array) -> Mend:
         both = truth_turned(back)(antenna_turned(back)(log))
         if log.stages[0].follows_position:
             return both
-        return first_changed(both, lambda held: _velocity(held, back))
+        return first_changed(both, lambda held: velocity_turned(held, back))
 
     return mend
 
 
-def _velocity(held: StageLog, back: Array) -> StageLog:
+def velocity_turned(held: StageLog, back: Array) -> StageLog:
     track = held.velocity_track
     quick = None if track is None else LogTrack(track.time_s, track.value @ back.T)
     return replace(held, velocity_mps=held.velocity_mps @ back.T, velocity_track=quick)

@@ -179,6 +179,8 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     words += f"; {fault.witness}" if fault.witness else ""
     named = finding(effect, label[1], stage, found, words + _of_a_clock(view, fault), gain)
     sentence = fault.sentence or named.sentence
+    if fault.velocity_alike:
+        sentence = f"{sentence}, and so do those of the velocity"
     if fault.readings:
         sentence = f"{sentence}, in {fault.readings} alone"
     return replace(named, sentence=sentence)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from syncline_design.diagnosis.gross_trials import (
 )
 from syncline_design.diagnosis.mending import Reread, restamps, value_of
 from syncline_design.diagnosis.scene import Scene, scene
+from syncline_design.diagnosis.velocity_alike import with_velocity_alike
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import rotate
@@ -60,6 +62,7 @@ class Gross:
     spread: float | None = None  # standard uncertainty of its parameter
     readings: str = ""  # of the sensor's, those that it acts on alone
     sentence: str = ""  # for people, where the effect's own says it worse
+    velocity_alike: bool = False  # the velocity columns followed it as well
     witness: str = ""  # what of the log's motion bears it out, where its error alone could not
 
 
@@ -114,8 +117,8 @@ class _Looking:
                 best = self._borne_out(log, base, taken)
             if best is None:
                 return tuple(found), log, size / max(expected_m, 1e-300)
-            found.append(_taken(best, size))
-            log = best.mend(log)
+            one, log = _undo(log, best, size)
+            found.append(one)
 
     def _best_of(
         self,
@@ -171,8 +174,8 @@ class _Looking:
         ]
         tried = sorted((_tried_out(t) for t in trials), key=lambda one: one.size_m)
         for one in [t for t in tried[:BEAM] if t.size_m < NO_WORSE * size]:
-            first = _taken(one, size)
-            found, left, over = self.down(one.mend(log), (first,))
+            first, rest = _undo(log, one, size)
+            found, left, over = self.down(rest, (first,))
             if len(found) > 1 and over < NEARLY_FREE:
                 return found, left
         return None
@@ -289,7 +292,10 @@ class _Tried:
     witness: str = ""
 
 
-def _taken(best: _Tried, size_m: float) -> Gross:
-    """A fault that was tried, of a log with so large a usual error."""
+def _undo(log: Log, best: _Tried, size_m: float) -> tuple[Gross, Log]:
+    """A fault of a log with so large a usual error, and the log without it."""
     falls_by = size_m / max(best.size_m, 1e-300)
-    return Gross(best.acting, falls_by, sentence=best.sentence, witness=best.witness)
+    left = best.mend(log)
+    alike = with_velocity_alike(log, left)
+    found = Gross(best.acting, falls_by, sentence=best.sentence, witness=best.witness)
+    return replace(found, velocity_alike=alike is not None), alike or left
