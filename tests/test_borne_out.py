@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from syncline_design.diagnosis import diagnose
 from syncline_design.diagnosis.gross import gross_faults
 from syncline_design.diagnosis.system import measured
 from syncline_design.logs.log import Log
@@ -38,7 +39,7 @@ stages:
 """
 
 
-def columns(seed: int, arm_m: np.ndarray = ARM_M, heads: float = 0.0) -> Columns:
+def columns(seed: int, arm_m: np.ndarray = ARM_M, heads: float | np.ndarray = 0.0) -> Columns:
     """A boat on a winding course; heads: its bow away from where it goes [deg]."""
     rng, time_s = np.random.default_rng(seed), np.arange(500) * 0.1
     course = 2.0 * np.sin(0.21 * time_s + rng.uniform(0, 6)) + 0.06 * time_s
@@ -123,3 +124,20 @@ def test_exchanged_angles_are_told_by_the_rates() -> None:
 @pytest.mark.parametrize("heads", [0.0, 90.0, 180.0, -90.0])
 def test_a_clean_log_has_no_turned_heading_wherever_its_vehicle_heads(heads: float) -> None:
     assert not any(named(seed, heads=heads) for seed in range(10, 20))
+
+
+TURNS_ABOUT = np.linspace(0.0, 720.0, 500)
+
+
+@pytest.mark.parametrize(("heads", "said"), [(TURNS_ABOUT, True), (0.0, False)])
+def test_where_no_way_tells_a_turned_heading_is_said_beside_the_arm(
+    heads: float | np.ndarray, said: bool, tmp_path: Path
+) -> None:
+    """Half a turn of yaw makes the error of an arm that is off by twice the arm."""
+    log = columns(5, ARM_M * [-1.0, -1.0, 1.0], heads)
+    spec, file = tmp_path / "spec.yaml", tmp_path / "log.csv"
+    spec.write_text(SPEC, encoding="utf-8")
+    table = np.stack(list(log.values()), axis=1)
+    np.savetxt(file, table, "%.6f", ",", header=",".join(log), comments="")
+    (arm,) = (one for one in diagnose(spec, [file]).findings if one.effect == "lever_arm")
+    assert ("a yaw that is off by 180 deg would make the same error" in arm.evidence) is said

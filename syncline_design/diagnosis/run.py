@@ -70,6 +70,7 @@ from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.survey import survey_m
 from syncline_design.diagnosis.system import Measured, measured, pinned_system
 from syncline_design.diagnosis.system_delay import with_system_delay
+from syncline_design.diagnosis.turned_heading import with_turned_heading
 from syncline_design.diagnosis.unseen_block import unseen_block
 from syncline_design.diagnosis.untouched import untouched_error
 from syncline_design.effects import registry
@@ -308,6 +309,7 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     )
     checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
     named = with_system_delay(with_one_delay(named), data.view.log.kind)
+    named = with_turned_heading(named, data.view)
     return WeighedUp(named, remaining, checks, before)
 
 

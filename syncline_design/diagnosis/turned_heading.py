@@ -1,0 +1,53 @@
+"""A lever arm that a heading off by quarter turns would show as well, where no way tells the two.
+
+With a yaw that is off by q, places R l of a level vehicle look like an arm Rz(-q) l.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from syncline_design.diagnosis.borne_out import FALLS_TO, WITHIN_RAD, heading_off
+from syncline_design.diagnosis.result import Finding
+from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects import registry
+from syncline_design.effects.record import Array
+from syncline_design.model.figure_text import to_places
+
+QUARTERS_DEG = (90.0, 180.0, -90.0)
+
+
+def with_turned_heading(named: Sequence[Finding], view: Scene) -> tuple[Finding, ...]:
+    """The findings, an arm of a position log with the turn of the heading that it may be."""
+    if view.log.kind != "position" or len(view.system.stages) != 1:
+        return tuple(named)
+    off = heading_off(view)
+    if off is not None and abs(off) < WITHIN_RAD:
+        return tuple(named)
+    arm_m = np.broadcast_to(view.rows[0].antenna_m, (len(view), 3))[0]
+    return tuple(_with_turn(one, arm_m) if _is_arm(one) else one for one in named)
+
+
+def _is_arm(one: Finding) -> bool:
+    return registry()[one.effect].breaks == "lever_arm" and one.sensor == "position"
+
+
+def _with_turn(one: Finding, arm_m: Array) -> Finding:
+    found = np.array([float(e.value) for e in one.parameters.values()])
+    for quarter in QUARTERS_DEG:
+        angle = -math.radians(quarter)
+        turn = np.array([[math.cos(angle), -math.sin(angle), 0.0],
+                         [math.sin(angle), math.cos(angle), 0.0], [0.0, 0.0, 1.0]])  # fmt: skip
+        left = np.linalg.norm(found - (turn @ arm_m - arm_m))
+        if left < FALLS_TO * np.linalg.norm(found):
+            words = (
+                f"a yaw that is off by {to_places(quarter, 0)} deg would make the same error, and "
+                "the way the vehicle goes does not tell: look at the heading before the arm is "
+                "changed"
+            )
+            return replace(one, evidence=f"{one.evidence}; {words}")
+    return one
