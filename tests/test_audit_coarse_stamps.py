@@ -3,13 +3,16 @@ late by many intervals: what stamps say of them, and what they leave open."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from syncline_design.auditing.run import audit
 from syncline_design.auditing.stream import Examined
 from syncline_design.machine.random_numbers import generator
-from tests.stamped_streams import of
+from tests.stamped_streams import EPOCH_NS, of
 
 Array = NDArray[np.float64]
 LENGTH_S = 80.0
@@ -178,3 +181,39 @@ def test_events_at_random_that_come_at_once_are_not_accused() -> None:
     sizes = rng.integers(1, 9, bursts.size)
     when = np.sort(np.repeat(bursts, sizes) + 1e-4 * np.concatenate([np.arange(n) for n in sizes]))
     assert names(of(when, when + 1e-4 + rng.gamma(2.0, 8e-5, when.size))) == set()
+
+
+def edged(first_tick: float, ppm: float) -> Array:
+    """25 Hz on the ticks of 10 ms; the first message so far behind one, in ticks."""
+    return np.ceil(measured(25.0, ppm, first_tick * 0.01) / 0.01 - 1e-6) * 0.01
+
+
+@pytest.mark.parametrize(("first_tick", "ppm"), [(0.1, -20.0), (0.04, -30.0), (0.9, 20.0)])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_turn_that_receipts_follow_was_measured_or_waited_for(
+    first_tick: float, ppm: float, seed: int
+) -> None:
+    """Taken for an edge of a grid that cuts, it put stamps behind their receipts."""
+    stamp = edged(first_tick, ppm)
+    assert np.unique(np.round(np.diff(stamp), 6)).size == 2
+    receive = np.maximum.accumulate(stamp + late(stamp.size, seed))
+    one = of(stamp, receive)
+    assert names(one) == set()
+    assert one.hidden is not None
+    assert "10 ms" in one.hidden.words
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - stamp)), rel=0.01)
+    waited = receive - measured(25.0, ppm, first_tick * 0.01)
+    assert counted(one) > 0.97 * float(np.ptp(waited))
+
+
+def test_a_drift_that_a_grid_may_make_says_so(tmp_path: Path) -> None:
+    """25 Hz, 40 ppm slow, cut off to 10 ms, over none of whose edges it drifts."""
+    when = measured(25.0, 40.0, 0.0031)
+    receive = np.maximum.accumulate(when + late(when.size, 1))
+    times = (np.rint(1e9 * t).astype(np.int64) for t in (np.floor(when / 0.01) * 0.01, receive))
+    rows = "".join(f"{EPOCH_NS + s},{EPOCH_NS + r}\n" for s, r in zip(*times, strict=True))
+    path = tmp_path / "x.csv"
+    path.write_text("stamp_ns,receive_ns\n" + rows, "utf-8")
+    (stream,) = audit([path]).streams
+    assert [fault.fault for fault in stream.faults] == ["drift"]
+    assert any("a grid of up to 20 ms cuts off" in said for said in stream.cannot_show)

@@ -22,6 +22,7 @@ _AS_FAR: Final = 0.5  # of the usual interval
 _MOST_TURNS: Final = 8  # of a sensor that hardly leaves the grid's rhythm; of others more show it
 _SURE: Final = 2.0  # sigma
 _CHANCE: Final = 0.1  # grains: what creeps by less hardly turns
+_HALF: Final = 0.5  # way between what is measured and what is cut off
 _NEXT: Final = 8  # messages on each side
 _MOST_LOST: Final = 0.15  # of all messages
 _OF_TWO: Final = 0.96  # of the intervals: one tick or two; among others messages may be lost
@@ -54,23 +55,25 @@ class Turns:
 
     creep: by how many grains receipts run away from the others' rhythm over the log, to the side
     that the turns make good for; off: what that is unsure by.  course: of receipts minus stamps
-    with both [grains].
+    with both [grains].  followed: messages come later by what a turn adds, so that it was measured.
     """
 
     count: int
     creep: float
     off: float
     course: Array
+    followed: bool
 
     @property
     def explained(self) -> bool:
         """Whether a sensor off the grid's rhythm may have made them: no clock need have moved."""
         fits = abs(self.creep - self.count) < _TURN + _SURE * self.off
-        return fits and self.creep + _SURE * self.off > _CHANCE
+        return fits and not self.followed and self.creep + _SURE * self.off > _CHANCE
 
     @property
     def shown(self) -> bool:
-        return abs(self.creep - self.count) < _TURN and self.creep > 2.0 * _SURE * self.off
+        fits = abs(self.creep - self.count) < _TURN and not self.followed
+        return fits and self.creep > 2.0 * _SURE * self.off
 
 
 def turns_of(series: Series, pace: Cadence, grain: int) -> Turns | None:
@@ -96,7 +99,23 @@ def turns_of(series: Series, pace: Cadence, grain: int) -> Turns | None:
     off = blocks.noise_s / (float(np.std(when)) * float(np.sqrt(when.size)))
     creep = float(np.sign(turned[0])) * slope * span
     course = slope * series.seconds[places] - extra
-    return Turns(int(count), creep, off * span, np.asarray(course))
+    turned_by = np.interp(when, series.seconds[places], extra)
+    followed = _followed(when, level, turned_by, blocks.noise_s)
+    return Turns(int(count), creep, off * span, np.asarray(course), followed)
+
+
+def _followed(when: Array, level: Array, turned: Array, noise: float) -> bool:
+    """Whether receipts turn with the stamps and do not run on evenly, as they do where a grid cuts.
+
+    level = a + b when + c turned: c is 1 of turns that were measured, 0 of those of a grid, and
+    has to be known well enough to tell the two.
+    """
+    straight = np.stack([np.ones_like(when), when - float(when.mean())], axis=1)
+    own = turned - straight @ np.linalg.lstsq(straight, turned, rcond=None)[0]
+    power = float(own @ own)
+    if power <= 0.0 or noise * _SURE > _HALF * float(np.sqrt(power)):
+        return False
+    return float(own @ level) / power > _HALF
 
 
 def _apart(series: Series, pace: Cadence, grain: int) -> bool:

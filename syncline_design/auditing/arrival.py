@@ -9,11 +9,13 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.auditing.alternations import turns_of
 from syncline_design.auditing.cadence import Cadence, about_rhythm, without_losses
 from syncline_design.auditing.frames import FRAMES_S, FULL_SPEED_S, Framed, framed
+from syncline_design.auditing.grains import grain_of
 from syncline_design.auditing.late_scatter import Waits, long_waits_of, waits_of
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import Array, Mask, Series, in_words, seconds, spread
+from syncline_design.auditing.series import NS, Array, Mask, Series, in_words, seconds, spread
 from syncline_design.auditing.tick_words import Paced
 from syncline_design.logs.readers.stream import PointTimes
 from syncline_design.machine.quick_dataclass import dataclass
@@ -123,6 +125,10 @@ def hidden_in(series: Series, pace: Cadence, ticks: Paced | None = None) -> Hidd
     found = framed(when)
     if found is not None:
         return _hidden_frame(found)
+    return _hidden_turn(series, pace) or _hidden_wait(when, transport, pace)
+
+
+def _hidden_wait(when: Array, transport: float, pace: Cadence) -> Hidden | None:
     waits = waits_of(without_losses(when, pace))
     if waits is None or not waits.edged:
         return None
@@ -133,6 +139,18 @@ def hidden_in(series: Series, pace: Cadence, ticks: Paced | None = None) -> Hidd
                   f"{in_words(reach)} from a sharp edge and receipts follow within "
                   f"{in_words(transport)}, which waits for a host's turn do as well as a sensor "
                   "that is triggered so")  # fmt: skip
+
+
+def _hidden_turn(series: Series, pace: Cadence) -> Hidden | None:
+    """What receipts follow by one grain was measured there, or waited for a tick of that length."""
+    grain = grain_of(series.stamp[pace.places])
+    turns = turns_of(series, pace, grain)
+    if turns is None or not turns.followed:
+        return None
+    few = f"{turns.count} of its intervals {'differs' if turns.count == 1 else 'differ'}"
+    return Hidden(grain / NS, f"whether a timer of {in_words(grain / NS)} stamped it: {few} from "
+                  "the others by one such tick, as where a sensor's clock drifts over its edge, "
+                  "and receipts follow, as they do what was measured there")  # fmt: skip
 
 
 def frame_of(series: Series) -> float:

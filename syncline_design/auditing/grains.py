@@ -83,6 +83,19 @@ def truncated(
     return None if followed(series, pace.places, grain / NS) else _grain(series, pace, grain)
 
 
+def cut_to_one_interval(series: Series, pace: Cadence) -> float:
+    """The coarsest grid [s] of which all intervals are one and the same number of grains; 0 without
+    one.  Cut off to it, a sensor's own interval shows only over an edge of the grid."""
+    stamp = series.stamp[pace.places]
+    passed = np.diff(stamp)
+    if passed.size < 2 or int(passed.min()) <= 0:
+        return 0.0
+    grain = grain_of(stamp)
+    usual = int(np.median(passed))
+    exact = grain > 0 and usual >= grain and not np.any(passed % usual)
+    return grain / NS if exact else 0.0
+
+
 def without_turns(series: Series, pace: Cadence) -> tuple[Series, float]:
     """The series without the turns of a grid that stamps lie on, whether it cut them off or not,
     nor what these make good for; with what turns may still look like [s], 0 without them."""

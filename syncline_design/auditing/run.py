@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from syncline_design import __version__
 from syncline_design.auditing.file_streams import FileStreams, recordings
+from syncline_design.auditing.grains import cut_to_one_interval
 from syncline_design.auditing.recorder import without_recorder_clock
 from syncline_design.auditing.result import (
     Audit,
@@ -30,6 +32,8 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import ContentsBeside, FileRead, note_read
 from syncline_design.model.figure_text import percent
 from syncline_design.spec.load import BadInput
+
+_TURN: Final = 1.3  # grains that a clock may run on by until a grid's edge shows
 
 
 def audit(paths: Sequence[Path]) -> Audit:
@@ -236,6 +240,12 @@ def _cannot_show(one: Examined, two: TwoTimes) -> tuple[str, ...]:
         said.append("its constant latency, nor how far its clock is from the recorder's")
     if one.hidden is not None:
         said.append(f"{one.hidden.words}; the bound counts {in_words(one.hidden.seconds)} for it")
+    grain_s = cut_to_one_interval(one.whole, one.pace)
+    drifts = [abs(float(f.parameters["ppm"])) for f in one.faults if f.fault == "drift"]
+    if drifts and 1e-6 * max(drifts) * float(np.ptp(one.series.seconds)) < _TURN * grain_s:
+        grid = f"a grid of up to {in_words(grain_s)}"
+        said.append(f"whether its clock drifts, or keeps an interval of its own that {grid} cuts "
+                    "off to one and the same: no edge of it lies within the log")  # fmt: skip
     if one.breathing_s > 0.0:
         far = in_words(one.breathing_s)
         said.append(f"why receipts move to and fro by {far} while its stamps keep their rhythm: "
