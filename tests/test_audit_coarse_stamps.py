@@ -217,3 +217,39 @@ def test_a_drift_that_a_grid_may_make_says_so(tmp_path: Path) -> None:
     (stream,) = audit([path]).streams
     assert [fault.fault for fault in stream.faults] == ["drift"]
     assert any("a grid of up to 20 ms cuts off" in said for said in stream.cannot_show)
+
+
+def with_losses(rate_hz: float, seed: int) -> Array:
+    when = measured(rate_hz, 17.0)
+    return np.asarray(when[generator((57, seed)).random(when.size) > 0.01])
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "tick_s"), [(15.0, 0.02), (23.0, 0.01), (29.97, 0.02), (20.0, 0.04)]
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_losses_hide_no_ticks(rate_hz: float, tick_s: float, seed: int) -> None:
+    """One message in a hundred missing: named, or said, and the bound holds the ticks."""
+    when = with_losses(rate_hz, seed)
+    stamp = np.ceil((when - 0.0071) / tick_s) * tick_s + 0.0071
+    taken = generator((59, seed)).gamma(2.0, 2e-4, when.size)
+    one = of(stamp, np.maximum.accumulate(stamp + taken))
+    assert one.hidden is not None or "packetised" in names(one)
+    assert counted(one) > 0.95 * float(np.ptp(stamp + taken - when))
+    even = np.maximum.accumulate(when + tick_s + late(when.size, seed))
+    one = of(stamp, even)
+    assert names(one) == {"packetised", "lost_messages"}
+    lost = next(f for f in one.faults if f.fault == "lost_messages")
+    assert lost.parameters["count"] == round((when[-1] - when[0]) * rate_hz) + 1 - when.size
+    assert one.residual.bound == pytest.approx(float(np.ptp(even - when)), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_losses_within_a_packet_are_put_where_receipts_have_them(seed: int) -> None:
+    """100 Hz in ticks of 16 ms: stamps alone tell no place of a loss within a tick."""
+    when = with_losses(100.0, seed)
+    stamp = np.ceil((when - 0.0071) / 0.016) * 0.016 + 0.0071
+    receive = np.maximum.accumulate(when + 0.016 + late(when.size, seed) / 3.0)
+    one = of(stamp, receive)
+    assert names(one) == {"packetised", "lost_messages"}
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - when)), rel=0.1)

@@ -83,10 +83,23 @@ def timed_by_receipts(count: Counted, series: Series) -> Counted:
     places = series.places()
     when = seconds(series.stamp[places] - series.stamp[places[0]])
     came = seconds(series.receive[places] - series.receive[places[0]])
-    period = best_period(came, count.number)
-    low, high = periods_within(when, count.number, _FULL * count.tick_s)
-    even = evener(came - period * count.number, came - when)
-    return replace(count, period_s=period) if even and low <= period <= high else count
+    timed = replace(count, period_s=best_period(came, count.number))
+    if not evener(timed.waits(came), came - when):
+        return count
+    placed = _placed_by(timed, came, when)
+    low, high = periods_within(when, placed.number, _FULL * count.tick_s)
+    return placed if low <= placed.period_s <= high else count
+
+
+def _placed_by(count: Counted, came: Array, when: Array) -> Counted:
+    """Losses put where receipts, which come evenly, have them: stamps tell no place in a tick."""
+    behind = count.waits(came)  # of delays, or a whole interval more
+    first = float(behind.min()) - _SLACK * count.period_s
+    number = count.number + np.floor((behind - first) / count.period_s)
+    placed = Counted(number, np.diff(number) - 1.0, best_period(came, number), count.tick_s)
+    nearer = float(np.ptp(placed.waits(came))) < float(np.ptp(behind))
+    full = float(np.ptp(placed.waits(when))) <= _FULL * count.tick_s
+    return placed if nearer and full and not np.any(placed.lost < 0.0) else count
 
 
 def evener(behind: Array, late: Array) -> bool:
@@ -105,13 +118,21 @@ def counted(when: Array, tick_s: float) -> Counted | None:
     if whole is not None:
         return whole
     if _mean(when) > _APART * tick_s:
-        return _by_floors(when, tick_s)
+        by_floors = _by_floors(when, tick_s)
+        full = by_floors is None or float(np.ptp(by_floors.waits(when))) <= _FULL * tick_s
+        return by_floors if full else _by_fewest(when, tick_s) or by_floors
+    return _by_fewest(when, tick_s)
+
+
+def _by_fewest(when: Array, tick_s: float) -> Counted | None:
+    """Messages counted so that the fewest are missing."""
     found = fewest_losses(when, _FULL * tick_s)
     if found is None:
         return None
     period, lost = found
     lost = _in_holes(lost, np.diff(when), _WITHIN, tick_s, period)
-    return _with(lost, period, tick_s)
+    found_so = _with(lost, period, tick_s)
+    return replace(found_so, period_s=best_period(when, found_so.number))
 
 
 def evenly(places: NDArray[np.intp]) -> bool:
@@ -266,13 +287,21 @@ def _numbered(deviation: Array, floor: Array, lost: Array, period: float, tick_s
 
 def _in_holes(lost: Array, interval: Array, size: int, tick_s: float, period: float) -> Array:
     """Losses longer than a tick [intervals] put where nothing came, some messages before they
-    show; what shows beside is of the same hole."""
+    show; what shows beside is of the same hole, where no wait is longer then."""
     if tick_s <= period:
         return lost
     placed = lost.copy()
     for k in np.flatnonzero(lost * period > tick_s):
         near = slice(max(0, int(k) - size), int(k) + size)
-        at = near.start + int(np.argmax(interval[near]))
-        whole, placed[near] = float(placed[near].sum()), 0.0
-        placed[at] = whole
+        there = np.zeros(placed[near].size)
+        there[int(np.argmax(interval[near]))] = placed[near].sum()
+        before, after = (_reach_of(interval[near] - period * (1.0 + n))
+                         for n in (placed[near], there))  # fmt: skip
+        if after <= max(before, _FULL * tick_s):
+            placed[near] = there
     return placed
+
+
+def _reach_of(steps: Array) -> float:
+    """By how much waits differ [s] that change so from message to message."""
+    return float(np.ptp(np.concatenate([[0.0], np.cumsum(steps)])))

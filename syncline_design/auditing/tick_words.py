@@ -23,6 +23,7 @@ from syncline_design.model.figure_text import to_digits
 
 LEAST_TICK_S: Final = 0.004  # quicker ones are of a sensor's own task
 _LEAST: Final = 128  # messages
+_STRETCH: Final = 24  # messages: two of a hundred lost leave most stretches whole
 _RARE: Final = 2.0  # % of intervals that may be of neither number
 _NOISY: Final = 0.05  # of a tick: interrupts that come later than that hide it
 _EXACT: Final = 0.002  # of a tick: how near to whole ticks intervals are
@@ -133,8 +134,9 @@ def _tick_of(passed: Array) -> float | None:
 
 
 def _balanced(counts: Array) -> bool:
-    """Whether most stretches of numbers stay near a line, as cheap to see as losses are common."""
-    near, _ = near_a_line(counts)
+    """Whether most stretches of numbers stay near a line: short ones, in most of which no message
+    is missing."""
+    near, _ = near_a_line(counts, _STRETCH)
     return float(np.mean(near)) > 0.5
 
 

@@ -64,12 +64,12 @@ def _by_a_line(counts: Array) -> bool:
     return float(np.mean(near)) > _NEAR_LINE and evenly(rare)
 
 
-def near_a_line(counts: Array) -> tuple[Mask, Array]:
-    """Which stretches of 64 messages number their ticks as an even rhythm does, to within rounding,
-    and ticks a message in each; counts: ticks between neighbours."""
+def near_a_line(counts: Array, window: int = _WINDOW) -> tuple[Mask, Array]:
+    """Which stretches of so many messages number their ticks as an even rhythm does, to within
+    rounding, and ticks a message in each; counts: ticks between neighbours."""
     number = np.concatenate([[0.0], np.cumsum(counts)])
-    windows = number[: number.size // _WINDOW * _WINDOW].reshape(-1, _WINDOW)
-    k = np.arange(_WINDOW) - 0.5 * (_WINDOW - 1)
+    windows = number[: number.size // window * window].reshape(-1, window)
+    k = np.arange(window) - 0.5 * (window - 1)
     slope = windows @ k / float(k @ k)
     left = windows - windows.mean(axis=1, keepdims=True) - np.outer(slope, k)
     return np.std(left, axis=1) < _BALANCED, slope
