@@ -5,12 +5,15 @@ A latency from one moment to another is, in the world, a clock that steps there 
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis import Diagnosis, diagnose
 from syncline_design.diagnosis.parts import LEAST, MOST, PartSums
+from syncline_design.diagnosis.positive import inverse
 from syncline_design.diagnosis.spans import StampSpan, span_of
 from syncline_design.effects import registry
 from syncline_design.report.on_diagnosis import sentence_text
@@ -61,6 +64,31 @@ def test_the_gap_counts_the_effect_where_it_acts_alone(found: Diagnosis) -> None
     ]
     assert outside
     assert not any(outside)
+
+
+def test_a_delay_of_a_while_is_no_slow_noise_of_hundreds_of_times_the_spec(tmp_path: Path) -> None:
+    """Slow courses sized without it take up what begins and ends."""
+    steps = [
+        hidden("timestamp_step", "position", step_s=size, time_s=at)
+        for size, at in ((0.15, 30.0), (-0.15, 60.0))
+    ]
+    log = make_log(scenario("car_stops", 5, 100.0, 5.0), tuple(steps))
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    result = diagnose(spec, [log.to_csv(tmp_path / "log.csv")])
+    (one,) = result.findings
+    assert (one.effect, one.sensor, one.kind) == ("latency", "position", "cause")
+    assert (one.from_s, one.to_s) == (pytest.approx(30.0, abs=0.25), pytest.approx(60.0, abs=0.25))
+    low, high = one.parameters["latency_s"].interval95 or (0.0, 0.0)
+    assert low < 0.15 < high < 0.16
+    assert result.verdict == "explained"
+
+
+def test_no_direction_is_solved_without_a_word_of_the_library(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    assert inverse(np.zeros((0, 0)), 1e-9).shape == (0, 0)
+    assert capfd.readouterr().err == ""
 
 
 def test_the_stretch_that_sums_by_block_say_is_the_best_by_plain_least_squares() -> None:

@@ -144,6 +144,31 @@ def in_a_part(
     return found
 
 
+def in_a_part_of_white(
+    states: States, model: Model, free: Sequence[Signature], least: float, level: NoiseLevel
+) -> list[Signature]:
+    """What acts in a stretch alone and would be worth more than `least` nat there, were noise
+    white, and more than in the whole log.
+
+    Slow courses take the shape of whatever begins and ends: here they are not there at all.
+    """
+    asked = [s for s in free if s.candidate.effect.passing and cuttable(s.candidate.effect)]
+    if states.count < BLOCKS or not asked:
+        return []
+    columns = [np.nan_to_num(one.columns) for one in asked]
+    blocks = blocks_of(states, model, columns)
+    own = blocks.free - len(asked)
+    by_level = replace(model, precision=precision(states.data.structure, level))
+    found = []
+    for k, (one, column) in enumerate(zip(asked, columns, strict=True)):
+        best = blocks.best(np.eye(len(blocks.prior))[own + k], np.r_[0:own], 0.0)
+        if best.gain < least or best.better < NATS + math.log(STRETCHES):
+            continue
+        span = _span(states, by_level, one.candidate.effect, column[:, :, 0], best)
+        found.append(cut_to(span, one, states.data.view.log.time_s))
+    return found
+
+
 def _judged(
     states: States,
     model: Model,

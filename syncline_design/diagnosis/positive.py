@@ -17,7 +17,9 @@ SAFE = 1e3  # times the share that is lost, from which no direction is near to b
 
 
 def _factor(matrix: Array, lost: float) -> Array | None:
-    """Lower Cholesky factor; None where a direction is lost, or may be."""
+    """Lower Cholesky factor; None where a direction is lost, or may be, or there is none at all."""
+    if not matrix.size:
+        return None  # LAPACK complains of it on the terminal
     lower, info = dpotrf(matrix, lower=1)
     if info != 0:
         return None

@@ -27,7 +27,13 @@ from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
 from syncline_design.diagnosis.pairs import promising, standing, with_pair
-from syncline_design.diagnosis.parts import NATS, STRETCHES, in_a_part, refined
+from syncline_design.diagnosis.parts import (
+    NATS,
+    STRETCHES,
+    in_a_part,
+    in_a_part_of_white,
+    refined,
+)
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.settling import weaker_judged
@@ -137,6 +143,7 @@ class Proposals:
         moving = [self.trial(model, s, level) for s, level in self.screened(model, rungs)]
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
         best = preferred(kept) or self.swallowed(model, scores, threshold)
+        best = self.part_instead(model, best)
         if best is None:
             both = [self.part_trial(model), self.pair_trial(model, rungs, threshold)]
             found = min([t for t in both if t], key=lambda t: t.log_p, default=None)
@@ -155,6 +162,23 @@ class Proposals:
         trials = [self.trial(model, s, model.level) for s in wanted]
         kept = [t for t in trials if t.log_p <= threshold and plausible(self.data, t.model)]
         return preferred([t for t in kept if self.stand_all(t.model, [t.candidate.label])])
+
+    def part_instead(self, model: Model, found: Trial | None) -> Trial | None:
+        """A trial, or what acts in a part of the log alone that slow courses have taken up.
+
+        It has to be clearly better than what acts all along, and to stand beside slow courses that
+        are sized with it.  Not beside a named one.
+        """
+        if model.acting:
+            return found
+        least = (found.gain if found else 0.0) + WANDER_NATS + math.log(STRETCHES)
+        level = ladder(self.data, model)[-1]
+        free = self.free_signatures(model)
+        asked = in_a_part_of_white(self.states, model, free, least, level)
+        trials = [self.trial(model, one, level, parted=True) for one in asked]
+        kept = [t for t in trials if t.gain > least and plausible(self.data, t.model)]
+        stand = [t for t in kept if self.stand_all(t.model, [t.candidate.label])]
+        return preferred(stand) or found
 
     def stand_all(self, model: Model, labels: Collection[Label]) -> bool:
         """Whether effects of a model stand beside slow courses that are sized with them."""
