@@ -5,40 +5,30 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
-from syncline_design.comparison.acceptance import AssumptionName, MeasuredFigure
+from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.departing import amount, of_finding
 from syncline_design.comparison.in_doubt import Suspicion, widened_by
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
+from syncline_design.diagnosis.knocks import after_a_knock, words_for
 from syncline_design.diagnosis.result import Diagnosis, Finding
-from syncline_design.effects import registry
-
-MOUNTED: Final[tuple[AssumptionName, ...]] = ("lever_arm", "mounting")  # that a knock breaks
 
 
 def shapes(found: Diagnosis) -> tuple[Finding, ...]:
     """Material findings that are the best word for something that has no name."""
-    return tuple(f for f in found.findings if f.material and f.kind == "stand_in")
+    return words_for(found.findings)
 
 
 def once_changed(found: Diagnosis) -> Diagnosis:
-    """The diagnosis, where all that has no name is what is built in and changed once: explained.
-
-    An arm or a mounting does not come and go, so a diagnosis does not call one that is off for a
-    part of a log the cause.  A knock changes it for good, though.  It is the cause where with it
-    nothing but noise is left, from it to the log's end or from the log's beginning to it.  A survey
-    or a reading that is off from then on is none: that is what a wrong fix looks like.
-    """
-    words = shapes(found)
+    """The diagnosis, where all that has no name is what a knock changed: explained."""
     settled = found.sound and not found.remaining.beyond_noise
-    if found.verdict != "unexplained" or not settled or not words:
+    if found.verdict != "unexplained" or not settled:
         return found
-    if not all(one.changed_once and registry()[one.effect].breaks in MOUNTED for one in words):
+    causes = after_a_knock(found.findings)
+    if causes is None:
         return found
-    causes = tuple(replace(f, kind="cause") if f in words else f for f in found.findings)
     left = replace(found.remaining, unexplained=False, material=False)
     return replace(found, verdict="explained", findings=causes, remaining=left)
 

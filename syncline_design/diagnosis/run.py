@@ -27,6 +27,7 @@ from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, whole_seconds
 from syncline_design.diagnosis.gross_trials import usual_size
 from syncline_design.diagnosis.identify import unseen
+from syncline_design.diagnosis.knocks import after_a_knock, words_for
 from syncline_design.diagnosis.late_part import is_far_off, late_part
 from syncline_design.diagnosis.mending import mended
 from syncline_design.diagnosis.motion_columns import (
@@ -291,8 +292,11 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     named = (*named, *(episode_finding(data, one, weights) for one in search.episodes or ()))
     if untouched is not None:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
+    checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
+    sound = all(c.severity != "contradiction" for c in checks)
+    named = (sound and not left and after_a_knock(named)) or named
     causes = [entry_of(one) for one in named if one.kind == "cause" and one.material]
-    waves = [one for one in named if one.kind == "stand_in" and one.material]
+    waves = words_for(named)
     material = bool(waves) or (left and weights.left(rest.size_m, causes))
     if material:
         named = stand_ins(named, data, result.model, rest.size_m, untouched)
@@ -307,7 +311,6 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
         size_m=rest.size_m,
         material=material,
     )
-    checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
     named = with_system_delay(with_one_delay(named), data.view.log.kind)
     named = with_turned_heading(named, data.view)
     return WeighedUp(named, remaining, checks, before)
