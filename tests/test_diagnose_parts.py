@@ -5,6 +5,7 @@ A latency from one moment to another is, in the world, a clock that steps there 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis import Diagnosis, diagnose
+from syncline_design.diagnosis.knocks import after_a_knock
 from syncline_design.diagnosis.parts import LEAST, MOST, PartSums
 from syncline_design.diagnosis.positive import inverse
 from syncline_design.diagnosis.spans import StampSpan, span_of
@@ -140,3 +142,56 @@ def test_a_cut_effect_departs_inside_alone_and_keeps_its_name() -> None:
 def test_the_page_says_when(found: Diagnosis) -> None:
     text = sentence_text(found)
     assert f", from {found.findings[0].from_s:.4g} s to" in text
+
+
+def test_an_antenna_that_was_knocked_is_the_cause_and_a_datum_that_jumps_is_none(
+    found: Diagnosis,
+) -> None:
+    """What is built in does not come and go; a wrong fix does."""
+    word = replace(found.findings[0], effect="lever_arm", kind="stand_in", changed_once=True,
+                   from_s=30.0, to_s=63.9)  # fmt: skip
+    other = replace(word, effect="datum_offset", sensor="target")
+    noise = replace(word, effect="correlated_noise", kind="noise", changed_once=None)
+    told = after_a_knock((word, noise))
+    assert told is not None
+    assert [one.kind for one in told] == ["cause", "noise"]
+    assert told[0].sentence == f"{word.sentence}, as after a knock"
+    assert after_a_knock((word, other)) is None
+    assert after_a_knock((replace(word, changed_once=None), noise)) is None
+    assert after_a_knock((noise,)) is None
+
+
+@pytest.mark.parametrize("what", ["arm", "heading"])
+def test_what_was_knocked_or_disturbed_is_told_with_its_moment(what: str, tmp_path: Path) -> None:
+    """Two logs of one drive, the second with the fault, joined at 30 s (and at 60 s)."""
+    drive = scenario("vessel_figure_eights", 5, 100.0, 5.0)
+    fault = (
+        hidden("lever_arm", "position", x_m=0.3, y_m=0.2, z_m=0.0)
+        if what == "arm"
+        else hidden("heading_bias", "attitude", bias_rad=0.03)
+    )
+    sound, off = make_log(drive), make_log(drive, (fault,))
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(sound.spec_yaml(), encoding="utf-8")
+    lines, later = (
+        one.to_csv(tmp_path / name).read_text("utf-8").splitlines()
+        for one, name in ((sound, "a.csv"), (off, "b.csv"))
+    )
+    last_s = 1e9 if what == "arm" else 60.0
+    head, rows = lines[0], zip(lines[1:], later[1:], strict=True)
+    joined = [b if 30.0 < float(a.split(",")[0]) < last_s else a for a, b in rows]
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join([head, *joined]) + "\n", encoding="utf-8")
+    result = diagnose(spec, [log])
+    (one,) = [f for f in result.findings if f.kind == "cause"]
+    assert result.verdict == "explained"
+    assert one.from_s == pytest.approx(30.0, abs=0.5)
+    if what == "arm":
+        assert (one.effect, one.changed_once) == ("lever_arm", True)
+        assert one.sentence.endswith(", as after a knock")
+        assert one.parameters["x_m"].value == pytest.approx(0.3, abs=0.05)
+    else:
+        assert one.effect == "heading_bias"
+        assert one.to_s == pytest.approx(60.0, abs=0.5)
+        low, high = one.parameters["bias_rad"].interval95 or (0.0, 0.0)
+        assert low < 0.03 < high

@@ -14,6 +14,7 @@ from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.log_evidence import LogEvidence
 from syncline_design.diagnosis.knocks import after_a_knock, words_for
 from syncline_design.diagnosis.result import Diagnosis, Finding
+from syncline_design.effects import registry
 
 
 def shapes(found: Diagnosis) -> tuple[Finding, ...]:

@@ -23,6 +23,7 @@ from syncline_design.diagnosis.candidates import (
 )
 from syncline_design.diagnosis.fitting import Data, Model, Opened, fit
 from syncline_design.diagnosis.judged import Judged
+from syncline_design.diagnosis.knocks import MOUNTED
 from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
@@ -38,7 +39,8 @@ from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possib
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.settling import weaker_judged
 from syncline_design.diagnosis.slow_states import States, slow_states
-from syncline_design.diagnosis.spans import span_of
+from syncline_design.diagnosis.spans import StampSpan, cut_to, span_of
+from syncline_design.diagnosis.stretches import changed_once, in_stretches
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import (
     freedom_of,
@@ -175,10 +177,20 @@ class Proposals:
         level = ladder(self.data, model)[-1]
         free = self.free_signatures(model)
         asked = in_a_part_of_white(self.states, model, free, least, level)
+        asked += self.knocked(model, free)
         trials = [self.trial(model, one, level, parted=True) for one in asked]
         kept = [t for t in trials if t.gain > least and plausible(self.data, t.model)]
         stand = [t for t in kept if self.stand_all(t.model, [t.candidate.label])]
         return preferred(stand) or found
+
+    def knocked(self, model: Model, free: Sequence[Signature]) -> list[Signature]:
+        """An arm or a mounting from a moment on, or until then, where of all that is built in it is
+        this that clearly changed once."""
+        hit = changed_once(self.data, model, in_stretches(free))
+        if hit is None or hit.signature.candidate.effect.breaks not in MOUNTED:
+            return []
+        span = StampSpan(hit.signature.candidate.effect, hit.from_s, hit.to_s)
+        return [cut_to(span, hit.signature, self.data.view.log.time_s)]
 
     def stand_all(self, model: Model, labels: Collection[Label]) -> bool:
         """Whether effects of a model stand beside slow courses that are sized with them."""

@@ -46,6 +46,7 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=50,
+    passing=True,
     breaks="mounting",
     comes_with="sensor",
     asked_in_stretches=True,
