@@ -21,6 +21,7 @@ from typer.testing import CliRunner
 
 import syncline_design as sd
 from browsing import flaws_of
+from html_page import Page
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.planning.drives import whole_drive
@@ -448,6 +449,15 @@ def test_a_drive_longer_than_its_minutes_is_not_called_the_best_for_them(pair: P
     assert longer.duration_s > 3.0
     assert "best for" not in words
     assert "No drive as short as 0.05 min was found" in words
+
+
+def test_a_target_has_one_name_on_the_page(pair: PlanRun) -> None:
+    """In the figure as in the table and the files: targets that no row aims at leave gaps."""
+    kept = tuple(t for t in pair.result.targets if t.id != pair.result.targets[0].id)
+    few = replace(pair, result=replace(pair.result, targets=kept))
+    shown = Page(str(render_plan("html", few))).text
+    assert all(f"target {t.id} {t.east_m:.1f} m east" in shown.replace("\N{MINUS SIGN}", "-")
+               .replace("\N{NO-BREAK SPACE}", " ") for t in kept)  # fmt: skip
 
 
 @pytest.mark.browser

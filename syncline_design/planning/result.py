@@ -104,6 +104,11 @@ class PlannedTarget(Record):
     down_m: float
     name: str | None = optional()
 
+    @property
+    def label(self) -> str:
+        """What it is called wherever it stands: by its name, else by its number."""
+        return self.name or str(self.id)
+
 
 @dataclass(frozen=True, slots=True)
 class Flown(Record):

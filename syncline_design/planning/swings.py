@@ -35,7 +35,7 @@ SLOWEST_SHARE: Final = 0.02  # of v_max: slower, little is left that a swing cou
 LEAST_SWING: Final = 1.1  # fast over slow
 HALVINGS: Final = 10
 FROM_FASTEST: Final = ("ease", "sag")
-AT_REST: Final = 0.005  # of the fastest: what rounding leaves of a stop
+AT_REST: Final = 0.02  # of the fastest: slower than that nobody can keep to
 HELD_S: Final = 0.5  # shorter, a speed is not held but passed
 ALONE: Final = ("rise", "dip", "brake", "ease", "sag")  # of a drive of one leg: it joins to nothing
 

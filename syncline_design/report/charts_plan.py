@@ -49,9 +49,9 @@ def path(run: PlanRun) -> InlineChart:
                       zorder=5)  # fmt: skip
         axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
                   "x", color=MUTED, markersize=4)  # fmt: skip
-        for k, one in enumerate(run.result.targets, 1):
+        for one in run.result.targets:
             place = _place(one.east_m, one.north_m)
-            tell(axes, one.east_m, one.north_m, [("Mark", f"target {k}"), ("Place", place)])
+            tell(axes, one.east_m, one.north_m, [("Mark", f"target {one.label}"), ("Place", place)])
         axes.plot(east[:1], north[:1], "o", color=SERIES[0], markersize=4.5)
         from_above(axes)
 

@@ -281,7 +281,7 @@ def _targets(found: Plan) -> list[Node]:
         )
     rows: list[tuple[Cell | str, ...]] = [
         (
-            t.name or str(t.id),
+            t.label,
             *(Cell(numbers.places(v, 1), v) for v in (t.north_m, t.east_m, t.down_m)),
         )
         for t in found.targets

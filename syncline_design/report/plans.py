@@ -124,7 +124,7 @@ def kml(run: PlanRun) -> str:
         _child(line, "coordinates", _coordinates(geodetic(run, ends)))
     for target in run.result.targets:
         mark = _child(document, "Placemark")
-        _child(mark, "name", f"target {visible(target.name or str(target.id))}")
+        _child(mark, "name", f"target {visible(target.label)}")
         point = _child(mark, "Point")
         _child(point, "altitudeMode", "absolute")
         place = [[target.north_m, target.east_m, target.down_m]]
