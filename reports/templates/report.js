@@ -50,14 +50,14 @@
     table.setAttribute("role", "table");
   });
 
-  // A table that goes on beyond its frame stands as cards on a phone, or closer, or says so.
-  var phone = window.matchMedia("(max-width: 34rem)");
+  // A table that goes on beyond its frame stands as cards where that is as narrow as a phone, or closer, or says so.
+  var phone = window.matchMedia("(max-width: 34rem)"), narrow = 31.5 * 16;
   function cut(frame) { return frame.scrollWidth > frame.clientWidth + 1; }
   function hint(frame) {
     var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 60;
     frame.classList.remove("tight");
     if (frame.dataset.turned) { frame.classList.remove("cards"); }
-    if (phone.matches && few && cut(frame)) { frame.classList.add("cards"); frame.dataset.turned = "yes"; }
+    if ((phone.matches || frame.clientWidth <= narrow) && few && cut(frame)) { frame.classList.add("cards"); frame.dataset.turned = "yes"; }
     if (cut(frame)) { frame.classList.add("tight"); }
     frame.classList.toggle("more", cut(frame));
     frame.classList.toggle("down", frame.matches(".inner, .long") && frame.scrollHeight > frame.clientHeight + 1);
