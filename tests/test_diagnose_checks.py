@@ -313,6 +313,30 @@ def test_a_log_beyond_the_limits_says_so(
     assert check.share == pytest.approx(np.mean(size > limit), abs=0.12)
 
 
+@pytest.mark.parametrize("kind", ["georeference", "position"])
+def test_a_device_that_hangs_is_told_from_when_to_when(kind: str, tmp_path: Path) -> None:
+    """Rows 200 to 214 repeat row 199; how far that is off against the raw columns."""
+    log = run_of("vessel_figure_eights", kind=kind)
+    names = [f"position_{axis}_m" for axis in ("north", "east", "down")]
+    before = np.array([log.columns[name].copy() for name in names])
+
+    def hung(columns: dict[str, Array]) -> None:
+        for name in names:
+            columns[name][200:215] = columns[name][199]
+
+    assert not [c for c in checked(written(log, tmp_path)) if c.code == "frozen_readings"]
+    (one,) = [c for c in checked(written(log, tmp_path, hung)) if c.code == "frozen_readings"]
+    time_s = log.columns["time_s"]
+    assert (one.severity, one.share) == ("caution", pytest.approx(15 / len(time_s)))
+    assert one.value == pytest.approx(time_s[214] - time_s[199])
+    off_m = float(np.max(np.linalg.norm(before[:, 200:215] - before[:, 199:200], axis=0)))
+    words = one.message
+    assert words.startswith("position (")
+    assert f"from {time_s[199]:.4g} s to {time_s[214]:.4g} s" in words
+    told = float(words.rpartition(" old and ")[2].split()[0])
+    assert told == pytest.approx(off_m, rel=0.1)
+
+
 def lasting(columns: dict[str, Array]) -> None:
     """A constant that the places do not follow: times a delay, it would look like a datum."""
     columns["velocity_north_mps"] += 0.8

@@ -130,9 +130,11 @@ class Proposals:
         """log p that one of so many candidates falls below at the stated rate, at most."""
         return math.log(MEAN_SHARE * self.settings.false_alarm_rate / max(candidates, 1))
 
-    def stands(self, one: Judged, effect: Effect) -> bool:
-        """Whether noise of another kind would not show as much of an effect by chance."""
-        charge = math.log(STEP_TIMES) if any(p.located for p in effect.parameters) else 0.0
+    def stands(self, one: Judged, effect: Effect, places: int = 1) -> bool:
+        """Whether noise of another kind would not show as much of an effect by chance; places: at
+        which it was looked for, but for those of a step."""
+        charge = math.log(places)
+        charge += math.log(STEP_TIMES) if any(p.located for p in effect.parameters) else 0.0
         return one.log_p + charge < self.chance(len({s.candidate.label for s in self.signatures}))
 
     def moving(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
@@ -180,7 +182,7 @@ class Proposals:
         asked += self.knocked(model, free)
         trials = [self.trial(model, one, level, parted=True) for one in asked]
         kept = [t for t in trials if t.gain > least and plausible(self.data, t.model)]
-        stand = [t for t in kept if self.stand_all(t.model, [t.candidate.label])]
+        stand = [t for t in kept if self.stand_all(t.model, [t.candidate.label], STRETCHES)]
         return preferred(stand) or found
 
     def knocked(self, model: Model, free: Sequence[Signature]) -> list[Signature]:
@@ -192,10 +194,10 @@ class Proposals:
         span = StampSpan(hit.signature.candidate.effect, hit.from_s, hit.to_s)
         return [cut_to(span, hit.signature, self.data.view.log.time_s)]
 
-    def stand_all(self, model: Model, labels: Collection[Label]) -> bool:
+    def stand_all(self, model: Model, labels: Collection[Label], places: int = 1) -> bool:
         """Whether effects of a model stand beside slow courses that are sized with them."""
         judged = weaker_judged(self.data, model, self.states)
-        return all(self.stands(one, a.effect) for a, one in judged if a.label in labels)
+        return all(self.stands(one, a.effect, places) for a, one in judged if a.label in labels)
 
     def not_for_good(self, model: Model, found: Trial) -> Trial:
         """A trial, or what goes back after a while in the place of a step that does not.

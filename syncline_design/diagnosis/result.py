@@ -33,9 +33,9 @@ MEANT = 1.1  # deviations over the spec's up to which a reading is as the spec s
 class Check(Record):
     """One thing that is wrong with a log before anything is named.
 
-    code: speed, turn_rate, range, velocity_columns or rate_columns.  value, limit: a quantile
-    against the platform's figure (SI), or the factor between columns and its 1; share: of rows
-    beyond the limit.
+    code: speed, turn_rate, range, velocity_columns, rate_columns or frozen_readings.  value,
+    limit: a quantile against the platform's figure (SI), the factor between columns and its 1, or
+    the age of a reading that is repeated and 0; share: of rows beyond the limit.
     """
 
     code: str
