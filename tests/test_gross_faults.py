@@ -107,7 +107,19 @@ PLACES = tuple(zip(names("position"), names("target"), strict=True))
 EVERYTHING = together(
     held(names("position"), SWAP), held(names("velocity", "mps"), SWAP), held(names("target"), SWAP)
 )
+ROBOT = together(
+    EVERYTHING, attitude(SWAP, LEFT_UP), scaled(["rate_y_degps", "rate_z_degps"], -1.0)
+)
 FAULTS: dict[str, tuple[Fault, str]] = {
+    "all in ENU, so is yaw": (
+        together(EVERYTHING, plus("yaw_deg", 90.0, -1.0)),
+        "east-north-up in all, yaw from east",
+    ),
+    "a robot's log": (ROBOT, "east-north-up in all, forward-left-up"),
+    "a robot's log, bearings too": (
+        together(ROBOT, scaled(["azimuth_deg"], -1.0)),
+        "east-north-up in all, forward-left-up, azimuth to the left",
+    ),
     "all in ENU": (EVERYTHING, "east-north-up (position, velocity and target alike)"),
     "targets in ENU": (held(names("target"), SWAP), "east-north-up"),
     "axes permuted": (held(names("position"), np.eye(3)[[1, 2, 0]]), "east-down-north"),
@@ -223,6 +235,15 @@ def test_a_convention_is_named_and_mended(name: str) -> None:
     assert np.cos(other.azimuth_rad - one.azimuth_rad) == pytest.approx(1.0, abs=1e-6)
     turned = euler_to_rotation(other.euler_rad)
     assert turned == pytest.approx(euler_to_rotation(one.euler_rad), abs=1e-4)
+
+
+def test_a_robots_log_is_mended_whole() -> None:
+    """Not the mirrored world that fits it as well: north stays north, and rates fit attitudes."""
+    _, _, mended = searched(ROBOT)
+    true = true_log()
+    assert mended.truth_m == pytest.approx(true.truth_m, abs=1e-3)
+    one, other = true.stages[0], mended.stages[0]
+    assert other.rate_radps == pytest.approx(one.rate_radps, abs=1e-5)
 
 
 @pytest.mark.parametrize("name", SHIFTS)

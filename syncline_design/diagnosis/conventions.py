@@ -34,6 +34,7 @@ from syncline_design.diagnosis.convention import (
     turned,
     vector_of,
 )
+from syncline_design.diagnosis.elsewhere import logs_from_elsewhere
 from syncline_design.diagnosis.swapped import swapped
 from syncline_design.effects.kinematics import (
     euler_to_rotation,
@@ -80,6 +81,7 @@ def best_conventions(system: System, log: Log) -> list[Convention]:
     few = log.rows(np.linspace(0, len(log) - 1, min(ROWS, len(log))).astype(int))
     parts = parts_of(system, few)
     found = [*swapped(parts, log), *_worlds(parts, log), *_attitudes(parts), *_polars(parts)]
+    found += logs_from_elsewhere(parts)
     found = [one for one in found if one.upright] or found
     found.sort(key=lambda one: (one.size_m, one.work))
     least = found[0].size_m if found else 0.0
