@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis import Diagnosis, diagnose
-from syncline_design.diagnosis.knocks import after_a_knock
+from syncline_design.diagnosis.knocks import after_a_knock, within_words
 from syncline_design.diagnosis.parts import LEAST, MOST, PartSums
 from syncline_design.diagnosis.positive import inverse
 from syncline_design.diagnosis.spans import StampSpan, span_of
@@ -159,6 +159,17 @@ def test_an_antenna_that_was_knocked_is_the_cause_and_a_datum_that_jumps_is_none
     assert after_a_knock((word, other)) is None
     assert after_a_knock((replace(word, changed_once=None), noise)) is None
     assert after_a_knock((noise,)) is None
+
+
+def test_a_cause_within_the_while_of_a_word_is_a_word_too(found: Diagnosis) -> None:
+    cause = replace(found.findings[0], from_s=27.0, to_s=29.0)
+    word = replace(cause, effect="datum_offset", kind="stand_in", from_s=22.3, to_s=40.3)
+    assert [one.kind for one in within_words((word, cause))] == ["stand_in", "stand_in"]
+    beside = replace(cause, from_s=39.0, to_s=44.0)
+    lasting = replace(cause, from_s=None, to_s=None)
+    small = replace(word, material=False)
+    for kept, other in ((beside, word), (lasting, word), (cause, small)):
+        assert within_words((other, kept))[1] is kept
 
 
 @pytest.mark.parametrize("what", ["arm", "heading"])

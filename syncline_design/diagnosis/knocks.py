@@ -4,6 +4,8 @@ An arm or a mounting does not come and go, so one that is off for a part of a lo
 for something else.  A knock changes it for good, though.  It is the cause where with it nothing but
 noise is left, from it to the log's end or from the log's beginning to it.  A survey or a reading
 that is off from then on is none: that is what a wrong fix looks like.
+
+What acts for a while only while something acts that has no name is none either.
 """
 
 from __future__ import annotations
@@ -21,6 +23,22 @@ MOUNTED: Final = ("lever_arm", "mounting")  # kinds of assumptions that a knock 
 def words_for(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """Material findings that are the best word for something that has no name."""
     return tuple(one for one in findings if one.material and one.kind == "stand_in")
+
+
+def within_words(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """The findings, of which a cause that acts within the while of such a word is one as well: what
+    is wrong then has no name, and the cause is what one part of it looks like."""
+    spans = [(one.from_s, one.to_s) for one in words_for(findings)]
+    inside = [
+        one.from_s is not None and one.to_s is not None and any(
+            first is not None and last is not None and first <= one.from_s and one.to_s <= last
+            for first, last in spans
+        ) for one in findings
+    ]  # fmt: skip
+    return tuple(
+        replace(one, kind="stand_in") if hidden and one.kind == "cause" else one
+        for one, hidden in zip(findings, inside, strict=True)
+    )
 
 
 def after_a_knock(findings: Sequence[Finding]) -> tuple[Finding, ...] | None:

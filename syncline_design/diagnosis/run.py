@@ -27,7 +27,7 @@ from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, whole_seconds
 from syncline_design.diagnosis.gross_trials import usual_size
 from syncline_design.diagnosis.identify import unseen
-from syncline_design.diagnosis.knocks import after_a_knock, words_for
+from syncline_design.diagnosis.knocks import after_a_knock, within_words, words_for
 from syncline_design.diagnosis.late_part import is_far_off, late_part
 from syncline_design.diagnosis.mending import mended
 from syncline_design.diagnosis.motion_columns import (
@@ -294,7 +294,7 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
     checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
     sound = all(c.severity != "contradiction" for c in checks)
-    named = (sound and not left and after_a_knock(named)) or named
+    named = within_words((sound and not left and after_a_knock(named)) or named)
     causes = [entry_of(one) for one in named if one.kind == "cause" and one.material]
     waves = words_for(named)
     material = bool(waves) or (left and weights.left(rest.size_m, causes))
