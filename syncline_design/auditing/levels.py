@@ -44,6 +44,8 @@ _RIVAL: Final = 0.5  # of the best: shapes of coarse places that may turn out be
 _EXTRA: Final = 0.004  # of what a shape explains: its freedom also fits what is nearly right
 _STEP_SHARE: Final = 0.25  # of the delays' spread: smaller steps are not named
 _DRIFT_SHARE: Final = 0.4  # of the delays' spread, over the whole log
+_ENDS_S, _ENDS = 3.0, 0.05  # of a log, within which a queue drains or fills: seconds, and a share
+_LASTS: Final = 0.5  # of a drift: as much of it is there between the ends
 _LEAST_RUN_S: Final = 2e-5  # over the log: hosts that are disciplined wander by as much
 
 
@@ -75,8 +77,24 @@ def shapes_of(
         found = grown
     found = _in_two_rates(found, blocks)
     keep = ~straddling(found, time_s, blocks.length_s)
-    kept = _pruned(time_s[keep], low[keep], found, blocks)
+    kept = _pruned(time_s[keep], low[keep], _without_end_drift(found, blocks), blocks)
     return tuple(s for s in kept if believed(s, blocks, least_s))
+
+
+def _without_end_drift(found: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape, ...]:
+    """Shapes less a drift that the levels at the ends of the log make: a clock drifts all along,
+    while a queue that drains as a log begins, or one that fills as it ends, delays but a few."""
+    time_s = blocks.time_s
+    end_s = max(_ENDS_S, _ENDS * float(np.ptp(time_s)))
+    inside = (time_s > time_s[0] + end_s) & (time_s < time_s[-1] - end_s)
+    keep = blocks.usable & inside & ~straddling(found, time_s, blocks.length_s)
+    drifts = [s for s in found if s.kind == "drift"]
+    if not drifts or int(keep.sum()) < len(found) + 6:
+        return found
+    inner = _fitted(time_s[keep], blocks.low_s[keep], found, blocks)
+    lasting = [a for a, b in zip(found, inner, strict=True)
+               if a.kind != "drift" or b.size_s / a.size_s > _LASTS]  # fmt: skip
+    return tuple(lasting)
 
 
 def _known_to_settle(

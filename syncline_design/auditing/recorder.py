@@ -94,12 +94,18 @@ def _shared(streams: Sequence[Examined]) -> tuple[tuple[Shape, ...], int]:
             if yes and 1 + yes >= _SHARE * (1 + len(able)):
                 kept.append(shape)
                 among = max(among, 1 + yes)
-        kept = lasting(anchor.blocks, kept) if anchor.blocks is not None else kept
+        if anchor.blocks is not None:
+            kept = lasting(anchor.blocks, kept, [s for s in kept if _is_sharp(streams, s)])
         if len(kept) > len(best[0]):
             best = tuple(kept), among
         if best[0] and len(best[0]) == len(mine) and not rest:
             break
     return best
+
+
+def _is_sharp(streams: Sequence[Examined], shape: Shape) -> bool:
+    """Whether receipts jump from one message to the next, in a stream that tells it."""
+    return shape.kind == "step" and any(_seen_beside(one, shape) is True for one in streams)
 
 
 def _of_stamps(one: Examined, shape: Shape) -> bool:

@@ -3,7 +3,8 @@
 Transport only delays: receipts come later for a while, never earlier than over an idle link.  So
 levels of receipt minus stamp lie on a line (idle, by a clock that drifts) or above it, on the line
 before and after each swell.  What a clock does lasts, or goes below that line.  The line is the low
-quantile of the levels that is straight.
+quantile of the levels that is straight.  A log that begins or ends within a swell has no level on
+one side of it: a clock that is slewed then looks the same, and none is named.
 Source: Koenker and Bassett, Econometrica 46 (1978), on regression quantiles.
 """
 
@@ -23,22 +24,26 @@ _IDLE: Final = 1.0 / 3.0  # share of the levels on each side that have to be of 
 _NEAR: Final = 0.05  # of a shape's size: how near the line an idle level lies
 _NOISE: Final = 3.0  # and of the levels' scatter
 _FEWEST: Final = 3  # levels on each side
+_LEAST_S: Final = 3.0  # and for how long: a swell near an end of the log is not over before that
 
 
-def lasting(blocks: Blocks, shapes: Sequence[Shape]) -> list[Shape]:
-    """Shapes but for those that transport makes by itself."""
+def lasting(blocks: Blocks, shapes: Sequence[Shape], sharp: Sequence[Shape] = ()) -> list[Shape]:
+    """Shapes but for those that transport makes by itself; sharp: from one message to the next."""
     if len(blocks) < 2 * _FEWEST:
         return list(shapes)
     above = blocks.low_s - _idle_line(blocks.time_s, blocks.low_s)
-    return [one for one in shapes if not _is_transport(blocks, above, one)]
+    return [one for one in shapes if one in sharp or not _is_transport(blocks, above, one)]
 
 
 def _is_transport(blocks: Blocks, above: Array, shape: Shape) -> bool:
     near = _NEAR * abs(shape.size_s) + _NOISE * blocks.noise_s
-    before, after = blocks.time_s < shape.begin_s, blocks.time_s > _over_s(shape)
+    sides = (blocks.time_s < shape.begin_s, blocks.time_s > _over_s(shape))
+    told = [
+        side for side in sides
+        if np.sum(side) >= _FEWEST and np.ptp(blocks.time_s[side]) >= _LEAST_S
+    ]  # fmt: skip
     return bool(np.all(above >= -near)) and all(
-        np.sum(side) >= _FEWEST and np.mean(np.abs(above[side]) <= near) >= _IDLE
-        for side in (before, after)
+        np.mean(np.abs(above[side]) <= near) >= _IDLE for side in told
     )
 
 
