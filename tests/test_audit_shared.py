@@ -50,6 +50,50 @@ def test_a_congested_link_is_no_clock_of_the_recorder(
     assert {row.name: names(row) for row in rows} == {name: [] for name in SENSORS}
 
 
+ENDS = {  # how much later, as a share of the most: seconds since the first and before the last
+    "a queue drains as it begins": lambda since, left: np.clip(1.0 - since / 1.6, 0.0, 1.0),
+    "a decay as it begins": lambda since, left: np.exp(-since / 0.8),
+    "a swell as it begins": lambda since, left: np.sin(
+        np.pi * np.clip((since + 2.0) / 4.0, 0.0, 1.0)
+    ),
+    "a swell soon after": lambda since, left: np.sin(
+        np.pi * np.clip((since - 2.0) / 4.0, 0.0, 1.0)
+    ),
+    "a swell as it ends": lambda since, left: np.sin(np.pi * np.clip((left + 2.0) / 4.0, 0.0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("how", ENDS)
+@pytest.mark.parametrize("most_s", [0.06, 0.15])
+def test_a_log_that_begins_or_ends_in_a_swell_is_no_clock(
+    tmp_path: Path, most_s: float, how: str
+) -> None:
+    paths = []
+    for seed, (name, (rate, scale)) in enumerate(SENSORS.items()):
+        t = even(rate, 60.0, 0.01 + 0.007 * seed)
+        late = most_s * ENDS[how](t - t[0], t[-1] - t)
+        got = np.maximum.accumulate(transported(t, scale, seed) + late)
+        paths.append(written(tmp_path / f"{name}.csv", t, got))
+    rows = audit(paths).streams
+    assert {row.name: names(row) for row in rows} == {name: [] for name in SENSORS}
+
+
+@pytest.mark.parametrize("ahead_s", [0.08, -0.08])
+@pytest.mark.parametrize("at_s", [2.0, 58.0])
+def test_a_recorder_that_is_set_near_an_end_is_named(
+    tmp_path: Path, at_s: float, ahead_s: float
+) -> None:
+    """From one message to the next, as no queue does."""
+    paths = []
+    for seed, (name, (rate, scale)) in enumerate(SENSORS.items()):
+        t = even(rate, 60.0, 0.01 + 0.007 * seed)
+        got = transported(t, scale, seed)
+        paths.append(written(tmp_path / f"{name}.csv", t, got + ahead_s * (got >= at_s)))
+    rows = {row.name: names(row) for row in audit(paths).streams}
+    assert "recorder_clock" in rows["imu"]
+    assert "recorder_clock" in rows["odom"]
+
+
 def in_parts(folder: Path, cut: float, apart: float = 0.0) -> list[Path]:
     """An IMU, set back by 50 ms where the file was split, with 3 s of it missing a second later,
     and a GNSS, in two folders, the second as of a run that much later."""
