@@ -194,3 +194,27 @@ def test_a_table_that_would_just_be_cut_stands_closer(browser: Any, tmp_path: Pa
         assert (False, True) not in seen
         opened.page.set_viewport_size({"width": 1300, "height": 900})
         opened.page.wait_for_function(f"!({closer})()")
+
+
+@pytest.mark.browser
+def test_what_a_finger_asked_for_stays_until_it_asks_anew(browser: Any, tmp_path: Path) -> None:
+    """A finger hides what it points at: the answer is read when it has gone."""
+    path = tmp_path / "page.html"
+    found = run_study(write(tmp_path, SAMPLE), StudySettings(workers=1))
+    path.write_text(str(render_study("html", found)), "utf-8")
+    phone = {"viewport": PHONE, "has_touch": True, "is_mobile": True}
+    with Opened(browser, path, **phone) as opened:
+        drawing = opened.page.locator(".drawing").first
+        drawing.scroll_into_view_if_needed()
+        opened.page.wait_for_timeout(200)
+        box = drawing.bounding_box()
+        assert box is not None
+        for share in (0.3, 0.4, 0.5, 0.6, 0.7):
+            opened.page.touchscreen.tap(box["x"] + 0.5 * box["width"],
+                                        box["y"] + share * box["height"])  # fmt: skip
+            opened.page.wait_for_timeout(100)
+            if opened.page.query_selector(".tip"):
+                break
+        assert opened.page.query_selector(".tip") is not None
+        opened.page.touchscreen.tap(10, box["y"] - 5)
+        opened.page.wait_for_function("() => !document.querySelector('.tip')")

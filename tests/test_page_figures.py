@@ -6,7 +6,8 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -14,7 +15,9 @@ from diagnosis_samples import CLOSED, diagnosis
 from html_page import Page
 from syncline_design.report import numbers
 from syncline_design.report.axes import log_ticks
+from syncline_design.report.charts import WIDTH, LedgerBar, ledger
 from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
+from syncline_design.report.charts_distribution import DensityBars, error_histogram
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_findings import NAT
@@ -24,12 +27,14 @@ from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.text import unbroken
+from syncline_design.report.verdict_words import failing_text
 from syncline_design.spec.load import load_text
 from syncline_design.studies.definition import Factor
 from syncline_design.verdict.optimize import (
     OptimizeSettings,
     optimize,
 )
+from syncline_design.verdict.tree import RequirementResult
 from syncline_design.verdict.verify import CheckSettings
 from tests.checked import check_file
 
@@ -236,3 +241,26 @@ def test_drawn_values_have_four_figures_and_listed_ones_all_of_theirs(
     drawn = Factor("key", (label,), "sample", (), listed=False)
     assert shown_value(drawn, label).replace("\u00a0", " ") == shown
     assert shown_value(Factor("key", (label,), "grid", ()), label) == label
+
+
+@pytest.mark.parametrize("limit_m", [6.0, 500.0])
+def test_a_lax_limit_makes_no_slivers_of_what_is_drawn(limit_m: float) -> None:
+    """Beyond five times all that is drawn it is told at the edge: the bars keep their room."""
+    limit = cast(numbers.Limited, SimpleNamespace(limit=limit_m, unit="m", limit_written=None))
+    bars = ledger([LedgerBar("range noise", 4.0, "sensor")], limit)
+    bins = error_histogram(
+        DensityBars((0.0, 1.0, 2.0, 3.0), (0.2, 0.5, 0.3), (("50 %", 1.5),), limit, None)
+    )
+    for drawn in (bars, bins):
+        assert max(told.left + told.wide for told in drawn.told) > 0.3 * WIDTH
+        assert ("limit" in drawn.svg, "\u2192" in drawn.svg) == (True, limit_m > 20.0)
+
+
+def test_those_that_fail_are_named_where_the_table_is_long() -> None:
+    rows = cast(
+        list[RequirementResult],
+        [SimpleNamespace(id=f"R{k}", status="fail" if k % 2 else "pass") for k in range(20)],
+    )
+    assert failing_text(rows) == "10 of 20: R1, R3, R5, R7, R9, R11 and 4 more"
+    assert failing_text(rows[:8]) == ""
+    assert failing_text(rows[::2]) == ""

@@ -54,7 +54,7 @@
   var phone = window.matchMedia("(max-width: 34rem)"), narrow = 31.5 * 16;
   function cut(frame) { return frame.scrollWidth > frame.clientWidth + 1; }
   function hint(frame) {
-    var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 60;
+    var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 300;
     frame.classList.remove("tight");
     if (frame.dataset.turned) { frame.classList.remove("cards"); }
     if ((phone.matches || frame.clientWidth <= narrow) && few && cut(frame)) { frame.classList.add("cards"); frame.dataset.turned = "yes"; }
@@ -152,7 +152,7 @@
     function nearest(event) {
       var frame = svg.getBoundingClientRect(), scale = frame.width / size.width;
       var x = (event.clientX - frame.left) / scale, y = (event.clientY - frame.top) / scale;
-      var best = -1, least = 16 / scale;
+      var best = -1, least = (event.pointerType === "touch" ? 28 : 16) / scale;
       rows.forEach(function (row, k) {
         var dx = Math.max(row[0] - x, 0, x - row[0] - row[2]), dy = Math.max(row[1] - y, 0, y - row[1] - row[3]);
         var away = Math.hypot(dx, dy) + 0.001 * Math.hypot(row[2], row[3]);
@@ -186,7 +186,9 @@
     drawing.setAttribute("aria-label", (svg.querySelector("title") || svg).textContent + ": arrow keys go through its " + rows.length + " points");
     drawing.addEventListener("pointermove", follow);
     drawing.addEventListener("pointerdown", follow);
-    drawing.addEventListener("pointerleave", hide);
+    // A finger leaves as it lifts, which is when one looks: what it showed stays until another touch.
+    drawing.addEventListener("pointerleave", function (event) { if (event.pointerType !== "touch") { hide(); } });
+    document.addEventListener("pointerdown", function (event) { if (!drawing.contains(event.target)) { hide(); } });
     drawing.addEventListener("keydown", step);
     drawing.addEventListener("blur", hide);
   }

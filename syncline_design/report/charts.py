@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
@@ -206,6 +206,11 @@ def _describe(curve: SynclineCurve) -> str:
     return " ".join(parts)
 
 
+LONG_NAME: Final = 24  # letters of a sensor beside its bar
+LAX: Final = 5.0  # times all that is drawn, from which on a limit is told at the edge
+BEYOND: Final = " \N{RIGHTWARDS ARROW}"
+
+
 @dataclass(frozen=True, slots=True)
 class TauBar:
     """One sensor's timestamp error beside the largest it may have."""
@@ -233,7 +238,7 @@ def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineChart:
         scales.set_ticks(axes, "y", range(len(bars)), lambda row: bars[int(row)].label)
         scales.hide_ticks(axes, "y")
         scales.grid(axes, "x")
-        axes.set_xlabel("timestamp error \u03c4 (bar) and \u03c4_crit (mark)")
+        axes.set_xlabel(title_of(bars))
 
     spoken = "; ".join(
         f"{b.label}: tau {numbers.time(b.tau_s)}, tau_crit {numbers.time_limit(b.tau_crit_s)}, "
@@ -241,7 +246,14 @@ def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineChart:
         for b in bars
     )
     title = "Timestamp error of each sensor against its tau_crit"
-    return draw(name, title, spoken, (WIDTH, 60.0 + 26.0 * len(bars)), build)
+    lines = title_of(bars).count("\n")
+    return draw(name, title, spoken, (WIDTH, 60.0 + 26.0 * len(bars) + 12.0 * lines), build)
+
+
+def title_of(bars: Sequence[TauBar]) -> str:
+    """The title of the time axis, in two lines beside names that leave it little room."""
+    between = "\n" if max((len(b.label) for b in bars), default=0) > LONG_NAME else " "
+    return f"timestamp error \u03c4 (bar){between}and \u03c4_crit (mark)"
 
 
 def _tau_row(axes: Axes, row: int, bar: TauBar, low: float, high: float) -> None:
@@ -287,7 +299,8 @@ def ledger(
         axes = add_axes(figure)
         _waterfall(axes, terms, total, limit)
         axes.set_ylim(len(terms) + 0.6, -0.6)
-        axes.set_xlim(0, 1.04 * max(total, 0.0 if limit is None else limit.limit) or 1.0)
+        far = limit is not None and limit.limit > LAX * total
+        axes.set_xlim(0, 1.04 * max(total, 0.0 if limit is None or far else limit.limit) or 1.0)
         if limit is not None:
             _mark_limit(axes, limit)
         labels = [*(t.label for t in terms), "total"]
@@ -341,10 +354,14 @@ def beside(axes: Axes, row: float, text: str) -> None:
 
 
 def _mark_limit(axes: Axes, limit: numbers.Limited) -> None:
-    axes.axvline(limit.limit, color=WARN, linewidth=1.6, zorder=4)
+    """The limit's line; one far beyond all bars is told at the edge, for they would be slivers."""
+    edge = axes.get_xlim()[1]
+    far = limit.limit > edge
+    if not far:
+        axes.axvline(limit.limit, color=WARN, linewidth=1.6, zorder=4)
     axes.annotate(
-        f"limit {numbers.limit(limit)}",
-        (limit.limit, 1.0),
+        f"limit {numbers.limit(limit)}{BEYOND if far else ''}",
+        (min(limit.limit, edge), 1.0),
         xycoords=("data", "axes fraction"),
         xytext=(0, 2),
         textcoords="offset points",

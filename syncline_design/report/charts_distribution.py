@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.charts import WIDTH
+from syncline_design.report.charts import BEYOND, LAX, WIDTH
 from syncline_design.report.palette import BAD, INK, SERIES, WARN
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
@@ -72,8 +72,11 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineChart:
         axes.stairs(data.density, data.edges_m, fill=True, color=SERIES[0], alpha=0.35, zorder=2)
         axes.stairs(data.density, data.edges_m, color=SERIES[0], linewidth=1.4, zorder=3)
         axes.set_ylim(0, top / (0.96 - LEVEL * len(marks)))
-        axes.set_xlim(min(data.edges_m[0], 0.0), _room_for(marks, data.edges_m[-1]))
-        _vertical_marks(axes, marks)
+        near = [mark for mark in marks if mark.error_m <= LAX * data.edges_m[-1]]
+        axes.set_xlim(min(data.edges_m[0], 0.0), _room_for(near, data.edges_m[-1]))
+        _vertical_marks(axes, near)
+        for mark in [one for one in marks if one not in near]:
+            _at_the_edge(axes, mark, len(near))
         _length_axis(axes, data.limit)
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
@@ -104,6 +107,14 @@ def _vertical_marks(axes: Axes, marks: Sequence[_Mark]) -> None:
             mark.label, (value, level * top), xytext=(4, 1), textcoords="offset points",
             ha="left", va="top", color=colour, zorder=6,
         )  # fmt: skip
+
+
+def _at_the_edge(axes: Axes, mark: _Mark, below: int) -> None:
+    """The label of a line far beyond all that is drawn, below the others' labels."""
+    axes.annotate(
+        mark.label + BEYOND, (1.0, 0.985 - LEVEL * below), xycoords="axes fraction",
+        ha="right", va="top", color=mark.colour, zorder=6,
+    )  # fmt: skip
 
 
 def _length_axis(axes: Axes, limit: numbers.Limited | None) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.charts import WIDTH
+from syncline_design.report.charts import BEYOND, LAX, WIDTH
 from syncline_design.report.palette import GOOD, LINE, MUTED, SURFACE, WARN
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
@@ -49,13 +49,13 @@ def pareto_front(
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        _staircase(axes, points, cost_limit)
+        costs = [p.cost for p in points]
+        near = cost_limit if cost_limit and cost_limit <= LAX * max(costs, default=0.0) else None
+        _staircase(axes, points, near)
         for point in points:
             tell(axes, point.cost, point.error_m, _says(point, currency, limit))
         errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
-        around = scales.in_view(
-            cloud, [p.cost for p in points], max(p.error_m for p in points), cost_limit
-        )
+        around = scales.in_view(cloud, costs, max(p.error_m for p in points), near)
         errors += [p.error_m for p in around]
         _cloud(axes, around, currency, limit)
         if beside is not None:
@@ -147,8 +147,9 @@ def _limits(
         axes.axhline(limit.limit, color=WARN, linewidth=1.6,
                      label=f"limit {numbers.limit(limit)}")  # fmt: skip
     if cost_limit:
+        beyond = BEYOND if cost_limit > axes.get_xlim()[1] else ""
         axes.axvline(cost_limit, color=WARN, linewidth=1.6, linestyle=(0, (5, 3)),
-                     label=f"limit {numbers.money(cost_limit, currency)}")  # fmt: skip
+                     label=f"limit {numbers.money(cost_limit, currency)}{beyond}")  # fmt: skip
 
 
 def _money_ticks(axes: Axes) -> None:

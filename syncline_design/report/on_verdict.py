@@ -153,6 +153,9 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     if figures is not None and figures.worst_case_m is not None:
         at = f"Worst case at {numbers.number(figures.worst_case_k, 6)} \u03c3{where}"
         facts.append((at, numbers.error(figures.worst_case_m, limit)))
+    failing = verdict_words.failing_text(verdict.requirements)
+    if failing:
+        facts.append(("Failing", failing))
     row = verdict_words.tightest(verdict.requirements)
     if row is not None:
         facts.append(("Tightest margin", f"{row.id}: {verdict_words.margin_text(row)}"))

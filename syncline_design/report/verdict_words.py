@@ -23,6 +23,9 @@ from syncline_design.report.words import (
 from syncline_design.verdict.obstacle import obstacle_sentence
 from syncline_design.verdict.tree import waived_misses
 
+LOOKED_OVER: Final = 8  # requirements that a reader takes in at a glance
+NAMED: Final = 6  # of those that fail, by name
+
 if TYPE_CHECKING:
     from syncline_design.verdict.named import NamedRole
     from syncline_design.verdict.optimization import Optimization
@@ -182,6 +185,15 @@ def margin_text(row: RequirementResult) -> str:
         return "exactly at the limit"
     word = "to spare" if margin > 0 else "over"
     return f"{numbers.percent(abs(margin))} {word}"
+
+
+def failing_text(rows: Sequence[RequirementResult]) -> str:
+    """`10 of 60: R5, R8 and 8 more`, where the table is too long to be looked over; else ""."""
+    names = [row.id for row in rows if row.status == "fail"]
+    if not names or len(rows) <= LOOKED_OVER:
+        return ""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{len(names)} of {len(rows)}: {', '.join(names[:NAMED])}{more}"
 
 
 def tightest(rows: Sequence[RequirementResult]) -> RequirementResult | None:
