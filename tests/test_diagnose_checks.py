@@ -9,8 +9,9 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from syncline_design.diagnosis.gap_result import Fit, Gap, HeldOut
 from syncline_design.diagnosis.scatter import scatter
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
+from syncline_design.logs.log import LogKind
 from syncline_design.report.diagnoses import render_diagnose
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_gap import closed_text
@@ -311,6 +313,15 @@ def test_a_log_beyond_the_limits_says_so(
     size = np.sqrt(np.sum(np.square(parts), axis=0))
     limit = float(limits.split()[1])
     assert check.share == pytest.approx(np.mean(size > limit), abs=0.12)
+
+
+def test_the_points_at_which_two_trajectories_are_compared_are_no_ranges(tmp_path: Path) -> None:
+    """They lie where both sensors' noise counts alike, whatever the spec's distance is."""
+    folder = written(run_of("multirotor_lines"), tmp_path, None, "distance: 12 m")
+    inputs = measured(load(folder / "spec.yaml"), [folder / "log.csv"])
+    for kind, codes in (("georeference", ["range"]), ("pose", [])):
+        log = replace(inputs.log, kind=cast(LogKind, kind))
+        assert [c.code for c in log_checks(scene(inputs.system, log, inputs.known))] == codes
 
 
 @pytest.mark.parametrize("kind", ["georeference", "position"])

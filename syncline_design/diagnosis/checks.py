@@ -77,7 +77,7 @@ def _limits(view: Scene, stage: Stage, logged: StageLog) -> Iterator[Check]:
             continue
         size = np.linalg.norm(spans.integral(series), axis=1) / spans.length_s
         yield from _limit(code, stage.name, size, limit, NOISE * sigma / MEAN_S[code], unit)
-    if logged.range_m is not None:
+    if logged.range_m is not None and view.log.kind != "pose":  # whose points are our own
         yield from _limit("range", stage.name, logged.range_m, platform.distance_m, 0.0, "m")
 
 
