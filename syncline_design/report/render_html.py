@@ -30,8 +30,7 @@ _TABLET: Final = 92  # characters in a line of a table there
 _PHONE: Final = 48
 _FEW: Final = 16  # lines of a table that is shown whole below its figure
 _BOX: Final = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
-# an id, a type, a power of ten; `u-blox`, `x-axis`
-_NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+|[A-Za-z]-[A-Za-z]{2,9})\b")
+_NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
 _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 _DOT: Final = re.compile(r"(?<=[\w\]])(?=\.)")
