@@ -88,13 +88,12 @@ def _without_end_drift(found: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape,
     end_s = max(_ENDS_S, _ENDS * float(np.ptp(time_s)))
     inside = (time_s > time_s[0] + end_s) & (time_s < time_s[-1] - end_s)
     keep = blocks.usable & inside & ~straddling(found, time_s, blocks.length_s)
-    drifts = [s for s in found if s.kind == "drift"]
+    drifts = any(s.kind == "drift" for s in found)
     if not drifts or int(keep.sum()) < len(found) + 6:
         return found
     inner = _fitted(time_s[keep], blocks.low_s[keep], found, blocks)
-    lasting = [a for a, b in zip(found, inner, strict=True)
-               if a.kind != "drift" or b.size_s / a.size_s > _LASTS]  # fmt: skip
-    return tuple(lasting)
+    return tuple(a for a, b in zip(found, inner, strict=True)
+                 if a.kind != "drift" or b.size_s / a.size_s > _LASTS)  # fmt: skip
 
 
 def _known_to_settle(

@@ -238,7 +238,7 @@ def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineChart:
         scales.set_ticks(axes, "y", range(len(bars)), lambda row: bars[int(row)].label)
         scales.hide_ticks(axes, "y")
         scales.grid(axes, "x")
-        axes.set_xlabel(title_of(bars))
+        axes.set_xlabel(_tau_title(bars))
 
     spoken = "; ".join(
         f"{b.label}: tau {numbers.time(b.tau_s)}, tau_crit {numbers.time_limit(b.tau_crit_s)}, "
@@ -246,11 +246,11 @@ def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineChart:
         for b in bars
     )
     title = "Timestamp error of each sensor against its tau_crit"
-    lines = title_of(bars).count("\n")
+    lines = _tau_title(bars).count("\n")
     return draw(name, title, spoken, (WIDTH, 60.0 + 26.0 * len(bars) + 12.0 * lines), build)
 
 
-def title_of(bars: Sequence[TauBar]) -> str:
+def _tau_title(bars: Sequence[TauBar]) -> str:
     """The title of the time axis, in two lines beside names that leave it little room."""
     between = "\n" if max((len(b.label) for b in bars), default=0) > LONG_NAME else " "
     return f"timestamp error \u03c4 (bar){between}and \u03c4_crit (mark)"
