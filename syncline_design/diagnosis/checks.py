@@ -53,6 +53,11 @@ def log_checks(view: Scene, named: Sequence[Acting] = ()) -> tuple[Check, ...]:
     return tuple(sorted(found, key=lambda c: c.severity != "contradiction"))
 
 
+def is_sound(checks: Sequence[Check]) -> bool:
+    """Whether nothing contradicts itself or the platform's limits."""
+    return all(one.severity != "contradiction" for one in checks)
+
+
 def contradicted_columns(view: Scene, named: Sequence[Acting] = ()) -> tuple[Check, ...]:
     """Columns of motion that are not the slope of the poses; named: what was found."""
     return tuple(

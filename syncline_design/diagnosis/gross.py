@@ -48,7 +48,7 @@ WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time s
 SEARCHED_TO = 0.1  # what is searched so widely has to help so much
 FAR_BETTER = 0.5  # of the error of the best fault of the list
 MEMORY_SHARES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)  # time constants over the shift of stamps
-NEARLY_FREE = 2.0  # the same for what is searched
+NEARLY_FREE = 2.0  # times the expected size: what nearly nothing but noise leaves
 SAME = 1.0 + 1e-9  # times the least error: as little
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
 

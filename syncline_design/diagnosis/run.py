@@ -16,7 +16,7 @@ from syncline_design.diagnosis.candidates import (
     hidden_by_noise,
     plain_signatures,
 )
-from syncline_design.diagnosis.checks import log_checks
+from syncline_design.diagnosis.checks import is_sound, log_checks
 from syncline_design.diagnosis.consequence import SpecPromise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.findings import entry_of, findings
@@ -273,7 +273,7 @@ class WeighedUp:
 
     @property
     def sound(self) -> bool:
-        return all(c.severity != "contradiction" for c in self.checks)
+        return is_sound(self.checks)
 
     @property
     def verdict(self) -> LogOutcome:
@@ -293,8 +293,8 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     if untouched is not None:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
     checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
-    sound = all(c.severity != "contradiction" for c in checks)
-    named = within_words((sound and not left and after_a_knock(named)) or named)
+    knocked = after_a_knock(named) if is_sound(checks) and not left else None
+    named = within_words(named if knocked is None else knocked)
     causes = [entry_of(one) for one in named if one.kind == "cause" and one.material]
     waves = words_for(named)
     material = bool(waves) or (left and weights.left(rest.size_m, causes))
