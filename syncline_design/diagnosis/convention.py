@@ -23,6 +23,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 
 Mend = Callable[[Log], Log]
+EULER = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,16 @@ def turned(values: Array, matrix: Array) -> Array:
     return np.where(known @ np.abs(matrix.T) > 0.0, found, np.nan)
 
 
+def scaled(held: Array, scale: Array, turn: Array) -> Array:
+    """Columns (n, k) as they should be: factors and zeros [rad] (k,) undone."""
+    return held * scale + turn
+
+
+def belly_down(rotation: Array) -> bool:
+    """Whether the vehicle keeps its belly down in most rows of R (n, 3, 3), body to NED."""
+    return bool(np.median(rotation[:, 2, 2]) > 0.0)
+
+
 def first_changed(log: Log, change: Callable[[StageLog], StageLog]) -> Log:
     return replace(log, stages=(change(log.stages[0]), *log.stages[1:]))
 
@@ -115,6 +126,13 @@ def everything_turned(back: Array) -> Mend:
         return first_changed(both, lambda held: velocity_turned(held, back))
 
     return mend
+
+
+def rates_turned(held: StageLog, back: Array) -> StageLog:
+    """Turn rates [rad/s, body axes] undone by a matrix (3, 3), quick ones as well."""
+    track = held.rate_track
+    quick = None if track is None else LogTrack(track.time_s, track.value @ back.T)
+    return replace(held, rate_radps=held.rate_radps @ back.T, rate_track=quick)
 
 
 def velocity_turned(held: StageLog, back: Array) -> StageLog:

@@ -19,15 +19,18 @@ from functools import partial
 import numpy as np
 
 from syncline_design.diagnosis.convention import (
+    EULER,
     Convention,
     Mend,
     Parts,
     angles_mended,
     antenna_turned,
+    belly_down,
     everything_turned,
     parts_of,
     polar_mended,
     rotation_mended,
+    scaled,
     size_of,
     sizes_of,
     truth_turned,
@@ -62,7 +65,6 @@ OTHER_ANGLES = ANGLES | {
     360.0: "turns for degrees",
     0.9: "gon for degrees",
 }
-EULER = ("roll", "pitch", "yaw")
 POLAR = ("azimuth", "elevation")
 QUARTERS = (0.0, 90.0, 180.0, -90.0)
 ENU_ANGLES = 1.0, (1.0, -1.0, -1.0), 90.0
@@ -167,15 +169,15 @@ def _attitudes(parts: Parts) -> Iterator[Convention]:
         return
     plain = euler_to_rotation(parts.euler)
     off = parts.antenna - parts.target
-    before = _belly_down(plain)
+    before = belly_down(plain)
     turns = [m for m in signed_permutations() if np.linalg.det(m) > 0.0]
     worlds = np.array([m.T for m in turns])
     for body in turns:
         rotation = plain @ body
         carried = rotate(rotation, parts.vector) @ np.swapaxes(worlds, 1, 2)  # exact: axes, signs
         sizes = sizes_of(off + carried).tolist()
-        belly_down = np.median(rotation[:, :, 2] @ worlds[:, 2].T, axis=0) > 0.0
-        for world, size, down in zip(turns, sizes, belly_down.tolist(), strict=True):
+        upright = np.median(rotation[:, :, 2] @ worlds[:, 2].T, axis=0) > 0.0
+        for world, size, down in zip(turns, sizes, upright.tolist(), strict=True):
             if np.array_equal(world, np.eye(3)) and np.array_equal(body, np.eye(3)):
                 continue
             words, work = _attitude_words(world, body), _changes(world) + _changes(body)
@@ -185,7 +187,7 @@ def _attitudes(parts: Parts) -> Iterator[Convention]:
     for euler, words, mend, work in _eulers(parts.euler):
         rotation = euler_to_rotation(euler)
         size = size_of(off + rotate(rotation, parts.vector))
-        upright = _belly_down(rotation) or not before
+        upright = belly_down(rotation) or not before
         yield Convention("attitude", words, mend, work, size, upright)
 
 
@@ -200,10 +202,6 @@ def _transposed(parts: Parts, plain: Array, off: Array) -> Convention:
     return Convention(
         "attitude", "world to body", rotation_mended(lambda r: np.swapaxes(r, 1, 2)), 2, size
     )
-
-
-def _belly_down(rotation: Array) -> bool:
-    return bool(np.median(rotation[:, 2, 2]) > 0.0)
 
 
 def _attitude_words(world: Array, body: Array) -> str:
@@ -229,11 +227,11 @@ def _eulers(euler: Array) -> Iterator[tuple[Array, str, Mend, int]]:
                 words += [unit] if unit else []
                 words = [ENU_WORDS] if (factor, signs, quarter) == ENU_ANGLES else words
 
-                mended = partial(_scaled, scale=scale, turn=turn)
+                mended = partial(scaled, scale=scale, turn=turn)
                 work = len(round_) + bool(quarter) + (factor != 1.0)
                 yield mended(euler), ", ".join(words), angles_mended(mended), work
     for scale, words_, work in _angle_units(EULER):
-        mended = partial(_scaled, scale=scale, turn=np.zeros(3))
+        mended = partial(scaled, scale=scale, turn=np.zeros(3))
         yield mended(euler), words_, angles_mended(mended), work
 
 
@@ -265,11 +263,7 @@ def attitude_signs() -> Iterator[Convention]:
 
 def _of_angles(scale: Array, turn_deg: float, words: str) -> Convention:
     turn = np.array([0.0, 0.0, math.radians(turn_deg)])
-    return Convention("attitude", words, angles_mended(partial(_scaled, scale=scale, turn=turn)), 1)
-
-
-def _scaled(held: Array, scale: Array, turn: Array) -> Array:
-    return held * scale + turn
+    return Convention("attitude", words, angles_mended(partial(scaled, scale=scale, turn=turn)), 1)
 
 
 def _polars(parts: Parts) -> Iterator[Convention]:
@@ -278,7 +272,7 @@ def _polars(parts: Parts) -> Iterator[Convention]:
         return
     rotation, off = euler_to_rotation(parts.euler), parts.antenna - parts.target
     for scale, turn, words, work in _polar_ways():
-        mended = partial(_scaled, scale=scale, turn=turn)
+        mended = partial(scaled, scale=scale, turn=turn)
         vector = vector_of(parts.arms, mended(parts.polar), len(parts.polar))
         size = size_of(off + rotate(rotation, vector))
         yield Convention("ranging", words, polar_mended(mended), work, size)

@@ -11,7 +11,6 @@ Source: ROS REP 103, Standard Units of Measure and Coordinate Conventions (2010)
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -24,23 +23,29 @@ from syncline_design.diagnosis.convention import (
     everything_turned,
     first_changed,
     polar_mended,
+    rates_turned,
+    scaled,
     size_of,
     turned,
     vector_of,
 )
 from syncline_design.effects.kinematics import euler_to_rotation, rotate
 from syncline_design.effects.record import Array
-from syncline_design.logs.log import Log, LogTrack, StageLog
+from syncline_design.logs.log import Log
+from syncline_design.logs.stream_values import ENU_TO_NED, FLU_TO_FRD
 from syncline_design.machine.quick_dataclass import dataclass
 
-NED_OF_ENU: Final = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-LEFT_UP: Final = np.array([1.0, -1.0, -1.0])  # a vector's forward, right, down of forward, left, up
-FROM_EAST: Final = np.array([0.0, 0.0, np.pi / 2.0])
+FROM_EAST: Final = np.array([0.0, 0.0, np.pi / 2.0])  # of roll, pitch and yaw [rad]
+FLU_ANGLES: Final = np.array([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """words: what the body's axes and bearings are beside the world; bearing, body: their signs."""
+    """A way of writing a log: what its body's axes and bearings are beside the world.
+
+    angles (3,): signs of roll, pitch, yaw; body (3, 3): its axes to forward, right, down; bearing
+    (3,): signs of range, azimuth, elevation; work: for ties, see `Convention`.
+    """
 
     words: str
     sentence: str
@@ -52,23 +57,23 @@ class _Way:
 
 _SENTENCE: Final = "All of the log is in east, north, up, with yaw from east to north"
 WAYS: Final = (
-    _Way("yaw from east", "", np.array([1.0, 1.0, -1.0]), np.ones(3), np.ones(3), 3),
+    _Way("yaw from east", "", np.array([1.0, 1.0, -1.0]), np.eye(3), np.ones(3), 3),
     _Way("forward-left-up", " and axes of the body forward, left, up",
-         np.array([1.0, -1.0, -1.0]), LEFT_UP, np.ones(3), 4),
+         FLU_ANGLES, FLU_TO_FRD, np.ones(3), 4),
     _Way("forward-left-up, azimuth to the left",
          " and axes of the body forward, left, up, to the left of which azimuth grows",
-         np.array([1.0, -1.0, -1.0]), LEFT_UP, np.array([1.0, -1.0, 1.0]), 5),
+         FLU_ANGLES, FLU_TO_FRD, np.array([1.0, -1.0, 1.0]), 5),
 )  # fmt: skip
 
 
 def logs_from_elsewhere(parts: Parts) -> Iterator[Convention]:
     """Each such way of writing a log, as one convention of its positions."""
-    antenna, target = parts.antenna @ NED_OF_ENU.T, turned(parts.target, NED_OF_ENU)
+    antenna, target = parts.antenna @ ENU_TO_NED.T, turned(parts.target, ENU_TO_NED)
     for way in WAYS:
         if parts.polar is None and np.any(way.bearing < 0.0):
             continue
         polar = None if parts.polar is None else parts.polar * way.bearing
-        rotation = euler_to_rotation(_angles(parts.euler, way))
+        rotation = euler_to_rotation(scaled(parts.euler, way.angles, FROM_EAST))
         vector = vector_of(parts.arms, polar, len(parts.euler))
         size = size_of(antenna + rotate(rotation, vector) - target)
         yield Convention(
@@ -77,19 +82,9 @@ def logs_from_elsewhere(parts: Parts) -> Iterator[Convention]:
         )  # fmt: skip
 
 
-def _angles(euler: Array, way: _Way) -> Array:
-    held: Array = euler * way.angles + FROM_EAST
-    return held
-
-
 def _mended(log: Log, way: _Way) -> Log:
-    log = angles_mended(partial(_angles, way=way))(everything_turned(NED_OF_ENU)(log))
+    log = everything_turned(ENU_TO_NED)(log)
+    log = angles_mended(partial(scaled, scale=way.angles, turn=FROM_EAST))(log)
     if log.stages[0].range_m is not None:
         log = polar_mended(lambda polar: polar * way.bearing)(log)
-    return first_changed(log, lambda held: _rates(held, way.body))
-
-
-def _rates(held: StageLog, body: Array) -> StageLog:
-    track = held.rate_track
-    quick = None if track is None else LogTrack(track.time_s, track.value * body)
-    return replace(held, rate_radps=held.rate_radps * body, rate_track=quick)
+    return first_changed(log, lambda held: rates_turned(held, way.body))

@@ -15,9 +15,11 @@ from functools import partial
 import numpy as np
 
 from syncline_design.diagnosis.convention import (
+    EULER,
     Convention,
     Parts,
     angles_mended,
+    belly_down,
     first_changed,
     polar_mended,
     size_of,
@@ -28,7 +30,6 @@ from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.derivatives import derived_velocity
 from syncline_design.logs.log import Log, StageLog
 
-EULER = ("roll", "pitch", "yaw")
 NED = ("north", "east", "down")
 ROUGHER = 2.0  # times as rough as the places of the better system are those that are measured
 
@@ -54,12 +55,12 @@ def angles_exchanged() -> Iterator[Convention]:
 
 def _attitudes(parts: Parts) -> Iterator[Convention]:
     off = parts.antenna - parts.target
-    before = euler_to_rotation(parts.euler)[:, 2, 2]
+    before = belly_down(euler_to_rotation(parts.euler))
     orders = (order for _, order in _exchanges(EULER, 0))
     for one, order in zip(angles_exchanged(), orders, strict=True):
         rotation = euler_to_rotation(parts.euler[:, order])
         size = size_of(off + rotate(rotation, parts.vector))
-        upright = bool(np.median(rotation[:, 2, 2]) > 0.0) or not np.median(before) > 0.0
+        upright = belly_down(rotation) or not before
         yield replace(one, size_m=size, upright=upright)
 
 

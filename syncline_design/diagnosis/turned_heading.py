@@ -15,6 +15,7 @@ from syncline_design.diagnosis.borne_out import FALLS_TO, WITHIN_RAD, heading_of
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
+from syncline_design.effects.kinematics import euler_to_rotation
 from syncline_design.effects.record import Array
 from syncline_design.model.figure_text import to_places
 
@@ -39,9 +40,7 @@ def _is_arm(one: Finding) -> bool:
 def _with_turn(one: Finding, arm_m: Array) -> Finding:
     found = np.array([float(e.value) for e in one.parameters.values()])
     for quarter in QUARTERS_DEG:
-        angle = -math.radians(quarter)
-        turn = np.array([[math.cos(angle), -math.sin(angle), 0.0],
-                         [math.sin(angle), math.cos(angle), 0.0], [0.0, 0.0, 1.0]])  # fmt: skip
+        (turn,) = euler_to_rotation(np.array([[0.0, 0.0, -math.radians(quarter)]]))
         left = np.linalg.norm(found - (turn @ arm_m - arm_m))
         if left < FALLS_TO * np.linalg.norm(found):
             words = (
