@@ -20,14 +20,13 @@ from syncline_design.diagnosis.checks import MEAN_S
 from syncline_design.diagnosis.consequence import expected_rms_m
 from syncline_design.diagnosis.episodes import without_episodes
 from syncline_design.diagnosis.fitting import Data, Model
-from syncline_design.diagnosis.frozen import frozen
-from syncline_design.diagnosis.frozen_channels import frozen_channels
 from syncline_design.diagnosis.instead import InItsPlace, in_place
 from syncline_design.diagnosis.late_at_random import late_at_random
 from syncline_design.diagnosis.late_rows import Late
 from syncline_design.diagnosis.late_runs import late_by_turns, late_runs
 from syncline_design.diagnosis.limits import Beyond, beyond_limits
 from syncline_design.diagnosis.looked_up import Mask
+from syncline_design.diagnosis.mending import without_rows
 from syncline_design.diagnosis.motion_columns import with_slopes
 from syncline_design.diagnosis.noise_split import NoiseFactors, factors, stated_m
 from syncline_design.diagnosis.one_course import OneCourse
@@ -51,8 +50,6 @@ from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
 from syncline_design.effects import plain_delay, registry
 from syncline_design.effects.record import Array
-from syncline_design.logs.derivatives import derived_velocity
-from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -104,7 +101,11 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
         turns, rest = _without_turns(inputs)
         one = examined(rest, settings)
         first = one
-        held, taken = _held(rest, one), list(_as_stands(inputs, one.data, turns))
+        hung, late = _hung(rest, one), _late(rest, one)
+        taken = list(_as_stands(inputs, one.data, turns))
+        if one.hanging.left_out:
+            taken, hung = [*hung, *taken], ()
+        held = (*hung, *late)
         seen = Stretches(held) if held else _seen(one)
         for _ in range(ROUNDS + bool(held)):
             sure = [s for s in seen.stands if s.sure]
@@ -146,8 +147,7 @@ def _without_turns(inputs: Measured) -> tuple[list[tuple[Late, ...]], Measured]:
     if not found:
         return [], inputs
     rows = np.isin(np.arange(len(view)), found[0].rows)
-    left = inputs.log.rows(np.flatnonzero(~rows))
-    return [found], replace(inputs, log=_derived_anew(left), reread=None)
+    return [found], replace(inputs, log=without_rows(inputs.log, rows), reread=None)
 
 
 def _moving(
@@ -166,22 +166,20 @@ def _moving(
     if derived or last.replaced:
         over_s = max(MEAN_S.values())
         wide = [replace(one, margin_s=one.margin_s + over_s) for one in taken]
-        log = log.rows(~_rows_of(log.time_s, wide))
-        log = _derived_anew(log) if any(one.stamps_s for one in taken) else log
+        out = _rows_of(log.time_s, wide)
+        log = without_rows(log, out) if any(one.stamps_s for one in taken) else log.rows(~out)
     return scene(inputs.system, log, inputs.known)
 
 
-def _held(inputs: Measured, one: SearchedLog) -> tuple[Stands, ...]:
-    """Rows of a log that repeat a reading while the vehicle moves on, as delays by their age, and
-    those that are late by more than their motion can be carried on."""
-    view = scene(inputs.system, inputs.log, inputs.known)
-    repeated = _repeated(inputs, view, one.data)
+def _late(inputs: Measured, one: SearchedLog) -> tuple[Stands, ...]:
+    """Rows that are late by more than their motion can be carried on, beside those that hang."""
     if one.faults:  # what is grossly wrong with all rows is undone in none of these
-        return repeated
+        return ()
+    view = scene(inputs.system, inputs.log, inputs.known)
     held = np.zeros(len(view), bool)
-    for each in repeated:
-        held |= (view.log.time_s >= each.from_s) & (view.log.time_s <= each.to_s)
-    return (*repeated, *_as_stands(inputs, one.data, late_runs(view, held)))
+    for each in one.hanging.found:
+        held[each.first : each.last + 1] = True
+    return tuple(_as_stands(inputs, one.data, late_runs(view, held)))
 
 
 def _as_stands(inputs: Measured, data: Data, late: Sequence[tuple[Late, ...]]) -> Iterator[Stands]:
@@ -206,10 +204,10 @@ def _as_stands(inputs: Measured, data: Data, late: Sequence[tuple[Late, ...]]) -
         )  # fmt: skip
 
 
-def _repeated(inputs: Measured, view: Scene, data: Data) -> tuple[Stands, ...]:
+def _hung(inputs: Measured, one: SearchedLog) -> tuple[Stands, ...]:
+    """Rows of a log that repeat a reading while the vehicle moves on, as delays by their age."""
     time_s, delay = inputs.log.time_s, plain_delay()
-    usual_m = max(expected_rms_m(data), 1e-300)
-    whole = frozen(view)
+    usual_m = max(expected_rms_m(one.data), 1e-300)
     return tuple(
         Stands(
             (delay.name, each.sensor, each.stage), inputs.system.stages[each.stage].name,
@@ -217,7 +215,7 @@ def _repeated(inputs: Measured, view: Scene, data: Data) -> tuple[Stands, ...]:
             (each.age_s,), (0.0,), -math.inf, True, inside=True, frozen=True, reading=each.reading,
             share=math.sqrt(float(np.sum(each.off_m**2)) / len(time_s)) / usual_m,
         )
-        for each in (*whole, *frozen_channels(view, whole))
+        for each in one.hanging.found
     )  # fmt: skip
 
 
@@ -283,19 +281,7 @@ def _less(inputs: Measured, taken: Sequence[Stands], least: float) -> Measured |
     inside = _rows_of(inputs.log.time_s, taken)
     if not np.any(inside) or np.sum(~inside) < least:
         return None
-    left = inputs.log.rows(np.flatnonzero(~inside))
-    return replace(inputs, log=_derived_anew(left), reread=None)
-
-
-def _derived_anew(log: Log) -> Log:
-    """A log with velocities that are slopes of the places that it holds, where they are slopes."""
-    stages = tuple(
-        replace(s, velocity_mps=derived_velocity(log.time_s, s.antenna_m))
-        if s.follows_position and s.antenna_m is not None and s.velocity_track is None
-        else s
-        for s in log.stages
-    )
-    return replace(log, stages=stages)
+    return replace(inputs, log=without_rows(inputs.log, inside), reread=None)
 
 
 def _rows_of(time_s: Array, taken: Sequence[Stands]) -> Mask:

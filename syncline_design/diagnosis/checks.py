@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from syncline_design.diagnosis.agreement import WORDS, disagreement, windows_of
-from syncline_design.diagnosis.hanging import hanging_checks
+from syncline_design.diagnosis.hanging import hanging, hanging_checks
 from syncline_design.diagnosis.result import Check, Severity
 from syncline_design.diagnosis.scatter import scatter, unforetold
 from syncline_design.diagnosis.scene import Scene
@@ -49,7 +49,7 @@ def log_checks(view: Scene, named: Sequence[Acting] = ()) -> tuple[Check, ...]:
         moves = all(one.code != "velocity_columns" for one in columns)
         if moves and not logged.follows_position:
             found += _scattering(view, index, stage, logged)
-    found += hanging_checks(view)
+    found += hanging_checks(view, hanging(view))
     return tuple(sorted(found, key=lambda c: c.severity != "contradiction"))
 
 

@@ -16,23 +16,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import within_half_a_turn
 from syncline_design.effects.record import ActsOn, Array
-from syncline_design.logs.log import StageLog
+from syncline_design.logs.log import Log, StageLog
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.system import Stage
+from syncline_design.model.system import Stage, System
 
 LEAST_ROWS: Final = 3  # that repeat a reading
 USUAL: Final = 3.0  # times the usual run of a log
 MOVED: Final = 5.0  # standard deviations of the reading
 RESTS: Final = 0.25  # standard deviations from the reading that is repeated
 SAME: Final = 1e-9  # of a reading's size, which interpolation between two equal ones leaves
+
+
+class LogOfSystem(Protocol):
+    """A log beside the system that made it."""
+
+    @property
+    def system(self) -> System: ...
+    @property
+    def log(self) -> Log: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +58,7 @@ class Frozen:
     reading: str = ""
 
 
-def frozen(view: Scene) -> list[Frozen]:
+def frozen(view: LogOfSystem) -> list[Frozen]:
     """All such runs of all sensors of a log, by sensor and time."""
     found: list[Frozen] = []
     for index, (stage, logged) in enumerate(zip(view.system.stages, view.log.stages, strict=True)):
@@ -107,7 +115,7 @@ def _readings(stage: Stage, logged: StageLog) -> Iterator[tuple[ActsOn, Array, A
         yield "ranging", np.column_stack(known), sigma, at_target_m
 
 
-def _path(view: Scene, index: int, sensor: ActsOn, logged: StageLog) -> Array:
+def _path(view: LogOfSystem, index: int, sensor: ActsOn, logged: StageLog) -> Array:
     """Place (n, 3) that a reading would have gone through, so that differences say how far."""
     time_s = view.log.time_s
     reach_m = 1.0 if logged.range_m is None else float(np.median(logged.range_m))
@@ -130,14 +138,14 @@ def runs(of: Repeats, sensor: ActsOn, stage: int) -> Iterator[Frozen]:
     size = np.maximum(np.abs(of.reading[1:]), 1.0)
     step = np.abs(np.diff(of.reading, axis=0))
     usual = _usual_run(len(of.reading), _side_by_side(np.all(step <= SAME * size, axis=1)))
+    least = max(LEAST_ROWS, math.ceil(USUAL * usual))
     near = np.all(step <= np.maximum(SAME * size, 2.0 * RESTS * of.sigma), axis=1)
     for first, most in _side_by_side(near):
         fresh = first
-        while fresh < most:
+        while most - fresh >= least:
             last = of.last(fresh, most)
             off = of.off(fresh, last)
-            long_enough = last - fresh >= max(LEAST_ROWS, math.ceil(USUAL * usual))
-            if long_enough and float(np.max(off)) > MOVED * of.sigma_m:
+            if last - fresh >= least and float(np.max(off)) > MOVED * of.sigma_m:
                 age_s = float(of.time_s[last] - of.time_s[fresh])
                 yield Frozen(sensor, stage, fresh + 1, last, age_s, off)
                 fresh = last

@@ -20,8 +20,8 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.diagnosis.frozen import Frozen, Repeats, runs, summed
-from syncline_design.diagnosis.scene import Scene, levers
+from syncline_design.diagnosis.frozen import Frozen, LogOfSystem, Repeats, runs, summed
+from syncline_design.diagnosis.scene import levers
 from syncline_design.effects.kinematics import euler_to_rotation, rotate, within_half_a_turn
 from syncline_design.effects.record import ActsOn, Array
 from syncline_design.logs.log import StageLog
@@ -54,7 +54,7 @@ class _Channel:
         return np.abs(within_half_a_turn(off) if self.angle else off)
 
 
-def frozen_channels(view: Scene, whole: Sequence[Frozen]) -> Iterator[Frozen]:
+def frozen_channels(view: LogOfSystem, whole: Sequence[Frozen]) -> Iterator[Frozen]:
     """Runs in which one reading hangs; whole: those of all readings of a sensor, told already."""
     for stage in range(len(view.system.stages)):
         for channel in _channels(view, stage):
@@ -81,13 +81,13 @@ def _is_sure(channel: _Channel, run: Frozen) -> bool:
     return float(np.quantile(off[elsewhere], BORNE_OUT)) < NEARER * most
 
 
-def _repeats(view: Scene, channel: _Channel) -> Repeats:
+def _repeats(view: LogOfSystem, channel: _Channel) -> Repeats:
     reading, course = channel.reading[:, None], channel.course[:, None]
     sigma = np.array([channel.sigma])
     return Repeats(view.log.time_s, reading, sigma, course, channel.sigma, angle=channel.angle)
 
 
-def _channels(view: Scene, stage: int) -> Iterator[_Channel]:
+def _channels(view: LogOfSystem, stage: int) -> Iterator[_Channel]:
     logged, own = view.log.stages[stage], view.system.stages[stage]
     turns = euler_to_rotation(logged.euler_rad)
     arm, lever = levers(own, stage)

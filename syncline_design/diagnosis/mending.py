@@ -6,8 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.effects.acting import Acting
+from syncline_design.logs.derivatives import derived_velocity
 from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
 from syncline_design.logs.merging import hermite
 from syncline_design.logs.stamps import per_stamp
@@ -90,3 +92,16 @@ def restamped(log: Log, seconds: float, reread: Reread | None = None) -> Log:
 def restamps(one: Acting) -> bool:
     """Whether it is undone by pairing rows anew, not by mending columns."""
     return one.effect.undoing is not None and one.effect.undoing.mend is None
+
+
+def without_rows(log: Log, out: NDArray[np.bool_]) -> Log:
+    """The log without some rows: velocities that are slopes of its places are those of what is
+    left."""
+    left = log.rows(np.flatnonzero(~out))
+    stages = tuple(
+        replace(s, velocity_mps=derived_velocity(left.time_s, s.antenna_m))
+        if s.follows_position and s.antenna_m is not None and s.velocity_track is None
+        else s
+        for s in left.stages
+    )
+    return replace(left, stages=stages)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from syncline_design.diagnosis.candidates import (
     plain_signatures,
 )
 from syncline_design.diagnosis.checks import is_sound, log_checks
-from syncline_design.diagnosis.consequence import SpecPromise, promise_of, rms_m, weighed
+from syncline_design.diagnosis.consequence import SHARE, SpecPromise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.findings import entry_of, findings
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
@@ -26,6 +26,7 @@ from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, whole_seconds
 from syncline_design.diagnosis.gross_trials import usual_size
+from syncline_design.diagnosis.hanging_rows import Hanging, without_hanging
 from syncline_design.diagnosis.identify import unseen
 from syncline_design.diagnosis.knocks import after_a_knock, within_words, words_for
 from syncline_design.diagnosis.late_part import is_far_off, late_part
@@ -122,6 +123,7 @@ class SearchedLog:
     """A log that was searched: gross faults undone, the model settled.
 
     replaced: columns of motion that contradict the poses, whose slopes were taken instead.
+    hanging: devices that hang in it; inputs are without these rows.
     """
 
     inputs: Measured
@@ -130,6 +132,7 @@ class SearchedLog:
     search: Search
     result: SearchResult
     replaced: tuple[Check, ...] = ()
+    hanging: Hanging = field(default_factory=Hanging)
 
     @property
     def found_any(self) -> bool:
@@ -145,7 +148,15 @@ class SearchedLog:
 def examined(
     inputs: Measured, settings: DiagnosisSettings, progress: SearchProgress = silent
 ) -> SearchedLog:
-    """Undo what is grossly wrong with a log, and look for what is missing."""
+    """Leave out what is no reading of its time, undo what is grossly wrong with a log, and look for
+    what is missing."""
+    less, hanging = without_hanging(inputs)
+    return replace(_examined(less, settings, progress), hanging=hanging)
+
+
+def _examined(
+    inputs: Measured, settings: DiagnosisSettings, progress: SearchProgress
+) -> SearchedLog:
     progress("looking for gross faults", 0.05)
     faults, log = gross_faults(
         inputs.system,
@@ -180,14 +191,14 @@ def _settled(
 
     def asked(wrong: tuple[Check, ...]) -> SearchedLog:
         sloped = with_slopes(log, wrong)
-        return replace(_examined(inputs, faults, sloped, settings, progress), replaced=wrong)
+        return replace(_beside(inputs, faults, sloped, settings, progress), replaced=wrong)
 
     one = asked(wrong)
     found = contradictions(view, one.result.model.acting)
     return one if columns_of(found) == columns_of(wrong) else asked(found)
 
 
-def _examined(
+def _beside(
     inputs: Measured,
     faults: tuple[Gross, ...],
     log: Log,
@@ -264,12 +275,16 @@ def told(
 
 @dataclass(frozen=True, slots=True)
 class WeighedUp:
-    """What was found, and what is left, with what both are worth; where the log disagrees."""
+    """What was found, and what is left, with what both are worth; where the log disagrees.
+
+    hangs: whether rows were left out in which a device hangs, and that matters.
+    """
 
     findings: tuple[Finding, ...]
     remaining: Remaining
     checks: tuple[Check, ...]
     cells: tuple[Regime, ...]
+    hangs: bool = False
 
     @property
     def sound(self) -> bool:
@@ -277,7 +292,8 @@ class WeighedUp:
 
     @property
     def verdict(self) -> LogOutcome:
-        return outcome(self.findings, self.sound and not self.remaining.material)
+        found = outcome(self.findings, self.sound and not self.remaining.material)
+        return "explained" if found == "agrees" and self.hangs else found
 
 
 def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
@@ -292,7 +308,9 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     named = (*named, *(episode_finding(data, one, weights) for one in search.episodes or ()))
     if untouched is not None:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
-    checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
+    checks = merged_checks(
+        (*one.replaced, *one.hanging.checks), log_checks(data.view, result.model.acting)
+    )
     knocked = after_a_knock(named) if is_sound(checks) and not left else None
     named = within_words(named if knocked is None else knocked)
     causes = [entry_of(one) for one in named if one.kind == "cause" and one.material]
@@ -313,7 +331,8 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     )
     named = with_system_delay(with_one_delay(named), data.view.log.kind)
     named = with_turned_heading(named, data.view)
-    return WeighedUp(named, remaining, checks, before)
+    hangs = one.hanging.size_m >= SHARE * weights.spec_m
+    return WeighedUp(named, remaining, checks, before, hangs)
 
 
 def _with_sizes(

@@ -167,7 +167,8 @@ def outcome_of(found: Diagnosis) -> Outcome:
 def _maybe_constant(found: Diagnosis) -> bool:
     """Whether constant noise within the spec's would do all that was found."""
     told = [one for one in found.findings if one.material]
-    return found.verdict == "explained" and all(one.within_noise is not None for one in told)
+    constant = bool(told) and all(one.within_noise is not None for one in told)
+    return found.verdict == "explained" and constant
 
 
 def _maybe_slow(found: Diagnosis) -> bool:
@@ -208,11 +209,16 @@ def _found_text(found: Diagnosis) -> str:
         said = [
             "Nothing was found that slow noise of the spec's size could not make."
             if slow
-            else "Nothing beyond the spec's own noise was found."
+            else f"Nothing{_beside(found)} beyond the spec's own noise was found."
         ]
     if not named and found.remaining.material:
         said.append("No effect of the dictionary explains what differs.")
     return " ".join([*said, left_text(found.remaining)]).strip()
+
+
+def _beside(found: Diagnosis) -> str:
+    """Of a log that is explained by what was left out of it."""
+    return " else" if found.verdict == "explained" else ""
 
 
 def _facts(found: Diagnosis) -> list[tuple[str, str]]:

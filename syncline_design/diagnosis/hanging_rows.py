@@ -1,0 +1,75 @@
+"""A log without the rows in which a device hangs.
+
+An ever older reading is no noise and no one value of anything: whatever a fit makes of it is wrong,
+and what it makes of the rows beside it as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from syncline_design.diagnosis.frozen import Frozen
+from syncline_design.diagnosis.hanging import hanging, hanging_checks, what_hangs
+from syncline_design.diagnosis.mending import without_rows
+from syncline_design.diagnosis.result import Check
+from syncline_design.diagnosis.system import Measured
+from syncline_design.logs.log import Log
+from syncline_design.machine.quick_dataclass import dataclass
+
+MOST_LEFT_OUT: Final = 0.6  # of the rows
+
+
+@dataclass(frozen=True, slots=True)
+class Hanging:
+    """Where devices of a log hang, and what is said of it.
+
+    left_out: whether the log is without these rows; not where they are nearly all of it.
+    size_m: RMS that these readings are off, over the whole log.
+    """
+
+    found: tuple[Frozen, ...] = ()
+    checks: tuple[Check, ...] = ()
+    left_out: bool = False
+    size_m: float = 0.0
+
+
+def without_hanging(inputs: Measured) -> tuple[Measured, Hanging]:
+    """The log without the rows in which a device hangs, counted among those that are left out."""
+    found = hanging(inputs)
+    if not found:
+        return inputs, Hanging()
+    log = _without(inputs, found)
+    left_out = len(log) < len(inputs.log)
+    checks = tuple(hanging_checks(inputs, found, left_out=left_out))
+    if not left_out:
+        return inputs, Hanging(found, checks)
+    read = inputs.reread
+
+    def reread(seconds: float) -> Log:
+        assert read is not None
+        again = replace(inputs, log=read(seconds))
+        return _without(again, hanging(again))
+
+    less = replace(inputs, log=log, reread=None if read is None else reread)
+    squares = sum(float(np.sum(one.off_m**2)) for one in found)
+    return less, Hanging(found, checks, left_out, math.sqrt(squares / len(inputs.log)))
+
+
+def _without(inputs: Measured, found: Sequence[Frozen]) -> Log:
+    """The log as it is where hardly anything else is left."""
+    log = inputs.log
+    hangs, rejected = np.zeros(len(log), bool), dict(log.rejected)
+    for one in found:
+        rows = np.arange(one.first, one.last + 1)
+        reason = f"{what_hangs(one)} of {inputs.system.stages[one.stage].name} hangs"
+        new = int(np.sum(~hangs[rows]))
+        rejected |= {reason: rejected.get(reason, 0) + new} if new else {}
+        hangs[rows] = True
+    if np.sum(hangs) > MOST_LEFT_OUT * len(log):
+        return log
+    return replace(without_rows(log, hangs), rejected=rejected)
