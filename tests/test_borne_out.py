@@ -90,6 +90,18 @@ def exchanged(log: Columns) -> None:
     log["roll_deg"], log["pitch_deg"] = log["pitch_deg"], log["roll_deg"]
 
 
+def from_east(log: Columns) -> None:
+    log["yaw_deg"] = (90.0 - log["yaw_deg"] + 180.0) % 360.0 - 180.0
+
+
+def turned_round(log: Columns) -> None:
+    log["yaw_deg"] = -log["yaw_deg"]
+
+
+def with_a_rate_turned_round(log: Columns) -> None:
+    log["rate_z_degps"] = -log["rate_z_degps"]
+
+
 def without_rates(log: Columns) -> None:
     exchanged(log)
     for axis in "xyz":
@@ -119,6 +131,20 @@ def test_exchanged_angles_are_told_by_the_rates() -> None:
         "roll and pitch under each other's name; the rates are then those of the attitude"
     ]
     assert named(4, without_rates) == []
+
+
+@pytest.mark.parametrize("seed", range(20, 26))
+@pytest.mark.parametrize(("fault", "said"), [(from_east, "yaw from east to north"),
+                                             (turned_round, "yaw turned round")])  # fmt: skip
+def test_a_heading_the_other_way_round_is_told_by_the_rates_and_its_zero_by_the_error(
+    seed: int, fault: Callable[[Columns], None], said: str
+) -> None:
+    assert named(seed, fault) == [f"{said}; the rates are then those of the attitude"]
+
+
+@pytest.mark.parametrize("seed", range(20, 26))
+def test_a_rate_that_is_turned_round_turns_no_heading(seed: int) -> None:
+    assert named(seed, with_a_rate_turned_round) == []
 
 
 @pytest.mark.parametrize("heads", [0.0, 90.0, 180.0, -90.0])

@@ -9,7 +9,7 @@ little as the best arm would.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -45,19 +45,24 @@ class BorneOut:
 
 
 def borne_out(system: System, log: Log, base: Scene) -> BorneOut | None:
-    """The convention of a position log's attitudes that its own motion and its error both show."""
+    """The convention of a position log's attitudes that its own motion and its error both show.
+
+    Of several the simplest that leaves no more than others, as far as the blocks of the log tell.
+    """
     if log.kind != "position" or len(system.stages) != 1:
         return None
     before = base.error()
     arm_m, least_m = _best_arm(base, before)
-    found = []
-    for one, witness in (*_by_course(base), *_by_rates(system, base)):
-        after = error_mended(system, log, base, one.mend)
-        left_m, _ = _best_arm(base, after)
+    best, best_left = None, before
+    ways = tuple(_by_rates(system, base)) or tuple(_by_course(base))
+    for alike, witness in sorted(ways, key=lambda way: way[0][0].work):
+        lefts = [error_mended(system, log, base, one.mend) for one in alike]
+        size_m, at = min((usual_size(left), k) for k, left in enumerate(lefts))
+        left_m, _ = _best_arm(base, lefts[at])
         gone = witness == RATES or np.linalg.norm(left_m) < FALLS_TO * np.linalg.norm(arm_m)
-        if gone and usual_size(after) < AS_GOOD * least_m and _falls(before, after):
-            found.append(BorneOut(one, witness, usual_size(after)))
-    return min(found, key=lambda one: one.size_m, default=None)
+        if gone and size_m < AS_GOOD * least_m and _falls(best_left, lefts[at]):
+            best, best_left = BorneOut(alike[at], witness, size_m), lefts[at]
+    return best
 
 
 def heading_off(base: Scene) -> float | None:
@@ -74,22 +79,25 @@ def heading_off(base: Scene) -> float | None:
     return -math.atan2(mean.imag, mean.real)
 
 
-def _by_course(base: Scene) -> Iterator[tuple[Convention, str]]:
+def _by_course(base: Scene) -> Iterator[tuple[tuple[Convention, ...], str]]:
     off = heading_off(base)
     quarter = 0 if off is None else round(off / (0.5 * math.pi))
     if off is None or not quarter or abs(off - 0.5 * math.pi * quarter) > WITHIN_RAD:
         return
-    yield yaw_quarter(90.0 * quarter if quarter > -2 else 180.0), COURSE
+    yield (yaw_quarter(90.0 * quarter if quarter > -2 else 180.0),), COURSE
 
 
-def _by_rates(system: System, base: Scene) -> Iterator[tuple[Convention, str]]:
-    """Angles exchanged or turned round, where rates contradict them as they are alone."""
+def _by_rates(system: System, base: Scene) -> Iterator[tuple[tuple[Convention, ...], str]]:
+    """Angles exchanged or turned round, where rates contradict them as they are alone.
+
+    A heading counted from another direction has the same rates: of its zeros the error tells.
+    """
     if not _contradicted(base):
         return
-    ways: Sequence[Convention] = (*angles_exchanged(), *attitude_signs())
-    for one in ways:
-        if not _contradicted(scene(system, one.mend(base.log), base.known)):
-            yield one, RATES
+    ways = (*((one,) for one in angles_exchanged()), *attitude_signs())
+    for alike in ways:
+        if not _contradicted(scene(system, alike[0].mend(base.log), base.known)):
+            yield alike, RATES
 
 
 def _contradicted(view: Scene) -> bool:

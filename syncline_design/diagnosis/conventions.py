@@ -15,6 +15,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Final
 
 import numpy as np
 
@@ -67,8 +68,12 @@ OTHER_ANGLES = ANGLES | {
 }
 POLAR = ("azimuth", "elevation")
 QUARTERS = (0.0, 90.0, 180.0, -90.0)
-ENU_ANGLES = 1.0, (1.0, -1.0, -1.0), 90.0
-ENU_WORDS = "enu: yaw from east to north, pitch up negative"
+BY_NAME: Final[
+    dict[tuple[float, tuple[float, ...], float], str]
+] = {  # factor, signs and zero of yaw that mend it
+    (1.0, (1.0, -1.0, -1.0), 90.0): "enu: yaw from east to north, pitch up negative",
+    (1.0, (1.0, 1.0, -1.0), 90.0): "yaw from east to north",
+}
 
 
 def is_of_unit(convention: str) -> bool:
@@ -215,24 +220,29 @@ def _attitude_words(world: Array, body: Array) -> str:
 
 def _eulers(euler: Array) -> Iterator[tuple[Array, str, Mend, int]]:
     """Signs, zero of yaw and unit of the angles: (mended angles, words, mend, work)."""
-    for factor, unit in ANGLES.items():
+    for factor in ANGLES:
         for signs in itertools.product((1.0, -1.0), repeat=3):
             for quarter in QUARTERS:
                 if factor == 1.0 and signs == (1.0, 1.0, 1.0) and not quarter:
                     continue
                 scale, turn = factor * np.array(signs), np.array([0.0, 0.0, math.radians(quarter)])
-                round_ = [n for n, s in zip(EULER, signs, strict=True) if s < 0]
-                words = [f"{' and '.join(round_)} turned round"] if round_ else []
-                words += [f"yaw off by {to_places(_held(quarter), 0)} deg"] if quarter else []
-                words += [unit] if unit else []
-                words = [ENU_WORDS] if (factor, signs, quarter) == ENU_ANGLES else words
-
                 mended = partial(scaled, scale=scale, turn=turn)
-                work = len(round_) + bool(quarter) + (factor != 1.0)
-                yield mended(euler), ", ".join(words), angles_mended(mended), work
+                work = signs.count(-1.0) + bool(quarter) + (factor != 1.0)
+                words_ = _euler_words(factor, signs, quarter)
+                yield mended(euler), words_, angles_mended(mended), work
     for scale, words_, work in _angle_units(EULER):
         mended = partial(scaled, scale=scale, turn=np.zeros(3))
         yield mended(euler), words_, angles_mended(mended), work
+
+
+def _euler_words(factor: float, signs: tuple[float, ...], quarter_deg: float) -> str:
+    """What angles hold that these mend."""
+    if (factor, signs, quarter_deg) in BY_NAME:
+        return BY_NAME[factor, signs, quarter_deg]
+    round_ = [n for n, s in zip(EULER, signs, strict=True) if s < 0]
+    words = [f"{' and '.join(round_)} turned round"] if round_ else []
+    words += [f"yaw off by {to_places(_held(quarter_deg), 0)} deg"] if quarter_deg else []
+    return ", ".join([*words, *([ANGLES[factor]] if ANGLES[factor] else [])])
 
 
 def _angle_units(names: Sequence[str]) -> Iterator[tuple[Array, str, int]]:
@@ -250,20 +260,22 @@ def _angle_units(names: Sequence[str]) -> Iterator[tuple[Array, str, int]]:
 
 def yaw_quarter(off_deg: float) -> Convention:
     """The yaw that is off by a quarter turn, or by half a turn."""
-    return _of_angles(np.ones(3), -off_deg, f"yaw off by {to_places(off_deg, 0)} deg")
+    return _of_angles((1.0, 1.0, 1.0), -off_deg if off_deg < 180.0 else 180.0)
 
 
-def attitude_signs() -> Iterator[Convention]:
-    """One, two or all of roll, pitch and yaw turned round."""
+def attitude_signs() -> Iterator[tuple[Convention, ...]]:
+    """One, two or all of roll, pitch and yaw turned round, each at every zero of yaw: that makes no
+    difference to rates."""
     for signs in itertools.product((1.0, -1.0), repeat=3):
-        names = [name for name, sign in zip(EULER, signs, strict=True) if sign < 0.0]
-        if names:
-            yield _of_angles(np.array(signs), 0.0, f"{' and '.join(names)} turned round")
+        if -1.0 in signs:
+            yield tuple(_of_angles(signs, quarter) for quarter in QUARTERS)
 
 
-def _of_angles(scale: Array, turn_deg: float, words: str) -> Convention:
-    turn = np.array([0.0, 0.0, math.radians(turn_deg)])
-    return Convention("attitude", words, angles_mended(partial(scaled, scale=scale, turn=turn)), 1)
+def _of_angles(signs: tuple[float, ...], quarter_deg: float) -> Convention:
+    turn = np.array([0.0, 0.0, math.radians(quarter_deg)])
+    mended = angles_mended(partial(scaled, scale=np.array(signs), turn=turn))
+    words, work = _euler_words(1.0, signs, quarter_deg), signs.count(-1.0)
+    return Convention("attitude", words, mended, work)
 
 
 def _polars(parts: Parts) -> Iterator[Convention]:
