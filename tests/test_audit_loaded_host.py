@@ -85,3 +85,45 @@ def test_a_counter_that_wraps_once_is_named(
     by_name = {f.fault: f.parameters for f in found.faults}  # its zero is an epoch of its own
     assert set(by_name) <= {"counter_wrap", "epoch_offset", "ahead_of_receipt"}
     assert by_name["counter_wrap"] == {"wrap_s": pytest.approx(range_s), "count": 1.0}
+
+
+def stalled_before_a_hole(
+    rng: np.random.Generator, rate_hz: float, hole_s: float, drain_s: float
+) -> tuple[Array, Array, float]:
+    """The host stands still for the last messages before a hole, and hands them over within it,
+    one every `drain_s`; with when the hole begins."""
+    at = np.arange(0.0, 70.0, 1.0 / rate_hz)
+    begin = float(rng.uniform(15.0, 50.0))
+    at = at[(at < begin) | (at > begin + hole_s)]
+    receive = at + 0.025 + rng.gamma(2.0, 1e-3, at.size)
+    first = begin - float(rng.uniform(0.1, 0.3))
+    held = (at > first) & (at < begin)
+    let_go = begin + float(rng.uniform(0.1, 0.4)) + drain_s * np.arange(int(held.sum()))
+    receive[held] = np.maximum(receive[held], let_go)
+    return at, np.maximum.accumulate(receive), begin
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("rate_hz", "drain_s"),
+    [(50.0, 1e-5), (50.0, 5e-3), (100.0, 1e-4), (100.0, 3e-3), (250.0, 2e-4)],
+)
+def test_messages_held_up_before_a_hole_tell_no_step(
+    rate_hz: float, drain_s: float, seed: int
+) -> None:
+    rng = np.random.default_rng([89, seed, int(rate_hz)])
+    stamp, receive, _ = stalled_before_a_hole(rng, rate_hz, 3.0, drain_s)
+    (fault,) = of(stamp, receive).faults
+    assert fault.fault == "gap"
+    assert fault.parameters["interval_s"] == pytest.approx(3.0, abs=2.0 / rate_hz)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("step_s", [0.3, 0.117])
+def test_a_step_of_whole_intervals_behind_a_stall_is_named(step_s: float, seed: int) -> None:
+    """Those that were not held up tell it, farther away."""
+    rng = np.random.default_rng([97, seed])
+    stamp, receive, begin = stalled_before_a_hole(rng, 100.0, 3.0, 1e-4)
+    found = of(stamp + step_s * (stamp > begin + 1.0), receive)
+    (step,) = [f for f in found.faults if f.fault == "step"]
+    assert step.parameters["seconds"] == pytest.approx(step_s, abs=1e-4)

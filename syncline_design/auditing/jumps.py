@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.auditing.backlog import held_up
 from syncline_design.auditing.cadence import Cadence, at_another_rate
 from syncline_design.auditing.naming import is_whole, slipped
 from syncline_design.auditing.pauses import LONG_GAP
@@ -135,6 +136,7 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
         return []
     width = min(spread(late), spread(late[_APART:] - late[:-_APART]))  # no slow course enters
     floor = max(noise, _SHARE * width)
+    late = np.where(held_up(pace.interval, late), np.nan, late)
     first = _sizes(pace, late, odd, odd[off_here[odd]], off_here, (width, floor))
     edges = np.asarray([j.place - 1 for j in first], np.intp)
     found = _sizes(pace, late, odd, edges, off_here, (width, floor))
@@ -170,7 +172,7 @@ def _equal(
     clear_s = 3.0 / _LEVEL * math.sqrt(places.size) * abs(size)
     bounds = [0, *(int(k) + 1 for k in places), late.size]
     sides = zip(bounds, bounds[1:], bounds[2:], strict=False)
-    levels = [_level(late[a:k], late[k:b], width, clear_s) for a, k, b in sides]
+    levels = [_level(_told(late[a:k]), _told(late[k:b]), width, clear_s) for a, k, b in sides]
     told = [(moved, sure) for moved, sure in levels if sure > 0.0]
     if len(told) < _LEAST_EQUAL:
         return []
@@ -213,6 +215,11 @@ def _level(before: Array, after: Array, width: float, clear_s: float) -> tuple[f
     return moved, sure
 
 
+def _told(late: Array) -> Array:
+    """The messages that tell a level."""
+    return np.asarray(late[~np.isnan(late)])
+
+
 def _sizes(
     pace: Cadence, late: Array, odd: NDArray[np.intp], edges: NDArray[np.intp],
     broken: Mask, limits: tuple[float, float],
@@ -228,7 +235,7 @@ def _sizes(
         begin = int(edges[at - 1]) + 1 if at > 0 else 0
         beyond = at + 1 if at < edges.size and edges[at] == k else at
         end = int(edges[beyond]) + 1 if beyond < edges.size else late.size
-        sides = late[begin : k + 1], late[k + 1 : end]
+        sides = _told(late[begin : k + 1]), _told(late[k + 1 : end])
         moved, sure = _level(*sides, width, 0.5 * pace.period_s)
         if sure <= 0.0:
             continue
