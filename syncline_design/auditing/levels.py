@@ -93,7 +93,7 @@ def _without_end_drift(found: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape,
         return found
     inner = _fitted(time_s[keep], blocks.low_s[keep], found, blocks)
     return tuple(a for a, b in zip(found, inner, strict=True)
-                 if a.kind != "drift" or b.size_s / a.size_s > _LASTS)  # fmt: skip
+                 if a.kind != "drift" or b.size_s * a.size_s > _LASTS * a.size_s**2)  # fmt: skip
 
 
 def _known_to_settle(
