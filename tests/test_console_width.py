@@ -124,6 +124,17 @@ def test_a_word_longer_than_the_line_is_not_broken() -> None:
     assert folded("see /a/very/long/path.yaml now", 10) == ["see", "/a/very/long/path.yaml", "now"]
 
 
+def test_a_name_that_no_column_holds_goes_on_after_one_of_its_joints() -> None:
+    long = "Survey_aircraft_with_quite_a_long_name_for_any_table"
+    shown = table("T", ("Term", "Stage", "Value #"), [("noise of positions", long, "12.5 mm")] * 9)
+    lines = list(fitted(shown, 60))
+    assert max(map(len, lines)) <= 60
+    parts = [word for line in lines[1:3] for word in line.split() if "_" in word]
+    assert "".join(parts) == long
+    assert parts[0].endswith("_")
+    assert max(map(len, fitted(table("T", ("A", "B"), [("x" * 90, "y")]), 40))) <= 40
+
+
 @pytest.mark.parametrize(
     ("environment", "terminal", "coloured"),
     [

@@ -9,11 +9,14 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 from typer.testing import CliRunner
 
+from simulation_systems import fixed_wing
+from study_specs import STUDY, write
 from syncline_design.cli.app import app
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -104,6 +107,29 @@ def test_the_python_of_the_guide_runs(
     done = run([sys.executable, str(script)], tmp_path)
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) > 60
+
+
+def python_of(page: str, part: int = 0) -> str:
+    """A block of Python of a page."""
+    blocks = BLOCK.finditer((DOCS / page).read_text("utf-8"))
+    return [found["body"] for found in blocks if found["language"] == "python"][part]
+
+
+def test_a_study_runs_from_python_as_its_page_says(tmp_path: Path) -> None:
+    write(tmp_path, STUDY)
+    (tmp_path / "read.py").write_text(python_of("trade-studies.md"), "utf-8")
+    done = run([sys.executable, "read.py"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == 6
+    assert re.search(r"meets \d+\.\d+$", done.stdout, re.M)
+
+
+def test_a_simulation_runs_from_python_as_its_page_says() -> None:
+    names: dict[str, Any] = {"system": fixed_wing()}
+    shorter = python_of("simulation.md").replace("200_000", "2_000")
+    exec(shorter, names)
+    assert names["errors_m"].shape == (2_000, 3)
+    assert [row.tau_s for row in names["rows"]] == [1e-4, 1e-3]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)

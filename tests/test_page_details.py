@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,9 @@ meets_when: decided
 """
 
 
+QUICK = "check: {monte_carlo: false, method: enumerate}\n"
+
+
 @pytest.mark.browser
 def test_the_cases_of_a_sample_fill_the_card_beside_their_figure(
     browser: Any, tmp_path: Path
@@ -172,6 +176,43 @@ def test_long_words_break_before_a_table_goes_on_sideways(
     with Opened(browser, path, viewport=viewport) as opened:
         assert opened.page.eval_on_selector_all(".scroll", beyond) == [0, 0]
         assert opened.page.query_selector(".more") is None
+
+
+@pytest.mark.browser
+def test_on_a_tablet_rows_stand_as_cards_before_a_table_goes_on_sideways(
+    browser: Any, tmp_path: Path
+) -> None:
+    """However many they are; and as rows again where there is room."""
+    path = tmp_path / "page.html"
+    heads = tuple(f"Heading{k}" for k in range(9))
+    path.write_text(page(*show(table("x", heads, [["1234.5678_m"] * 9] * 400))), "utf-8")
+    cut = "e => e.scrollWidth - e.clientWidth"
+    row = "e => getComputedStyle(e).display"
+    with Opened(browser, path, viewport={"width": 1500, "height": 900}) as opened:
+        for width, shape in ((768, "grid"), (420, "flex"), (1500, "table-row")):
+            opened.page.set_viewport_size({"width": width, "height": 900})
+            opened.page.wait_for_timeout(100)
+            assert opened.page.eval_on_selector(".scroll", cut) <= 1
+            assert opened.page.eval_on_selector("tbody tr", row) == shape
+
+
+@pytest.mark.browser
+def test_the_file_of_a_figure_holds_all_its_values(browser: Any, tmp_path: Path) -> None:
+    """Of 300 cases the table shows 200; and figures stand without gaps."""
+    path, file = tmp_path / "page.html", tmp_path / "values.csv"
+    text = SAMPLE.replace("count: 20", "count: 220").replace("meets_when", QUICK + "meets_when")
+    found = run_study(write(tmp_path, text), StudySettings(workers=1))
+    path.write_text(str(render_study("html", found)), "utf-8")
+    with Opened(browser, path, viewport=WIDE) as opened:
+        assert opened.page.locator("#sampled tbody tr").count() == 200
+        with opened.page.expect_download() as waiting:
+            opened.page.locator("#sampled").get_by_role("button", name="as CSV").first.click()
+        waiting.value.save_as(file)
+    rows = list(csv.DictReader(file.read_text("utf-8").splitlines()))
+    assert [int(row["Case"]) for row in rows] == list(range(1, 221))
+    prices = [case.record.cost for case in found.cases() if case.verdict == "meets"]
+    told = [float(row["Price"].split(" ")[0]) for row in rows if row["Price"]]
+    assert told == pytest.approx(prices)
 
 
 @pytest.mark.browser

@@ -13,9 +13,10 @@ import pytest
 
 from diagnosis_samples import CLOSED, diagnosis
 from html_page import Page
+from syncline_design.model.written import beside
 from syncline_design.report import numbers
 from syncline_design.report.axes import log_ticks
-from syncline_design.report.charts import WIDTH, LedgerBar, ledger
+from syncline_design.report.charts import WIDTH, LedgerBar, SynclineCurve, ledger, syncline
 from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
 from syncline_design.report.charts_distribution import DensityBars, error_histogram
 from syncline_design.report.on_choice import on_choice
@@ -27,7 +28,7 @@ from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.text import unbroken
-from syncline_design.report.verdict_words import failing_text
+from syncline_design.report.verdict_words import failing_text, margin_text
 from syncline_design.spec.load import load_text
 from syncline_design.studies.definition import Factor
 from syncline_design.verdict.optimize import (
@@ -254,6 +255,39 @@ def test_a_lax_limit_makes_no_slivers_of_what_is_drawn(limit_m: float) -> None:
     for drawn in (bars, bins):
         assert max(told.left + told.wide for told in drawn.told) > 0.3 * WIDTH
         assert ("limit" in drawn.svg, "\u2192" in drawn.svg) == (True, limit_m > 20.0)
+
+
+@pytest.mark.parametrize(("limit_m", "arrow"), [(1e-9, "\u2191"), (5e-3, ""), (2e6, "\u2193")])
+def test_a_limit_far_from_all_errors_leaves_them_the_frame(limit_m: float, arrow: str) -> None:
+    """Errors of 0.3 m to some 80 m: a limit of 1 nm at the edge, not nine decades of nothing."""
+    limit = cast(numbers.Limited, SimpleNamespace(limit=limit_m, unit="m", limit_written=None))
+    curve = SynclineCurve(0.29, 157.0, 1.85e-3, 24e-6, 0.294, limit)
+    svg = syncline(curve).svg
+    label = re.search(r">limit [^<]*<", svg)
+    assert label is not None
+    assert "".join(re.findall("[\u2191\u2193]", label[0])) == arrow
+    box = syncline(curve).box
+    assert box.log_top - box.log_bottom < 6.0
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "shown"),
+    [(0.3, 0.4, "25 % to spare"), (0.9, 0.4, "125 % over"), (4.4, 0.4, "11 times the limit"),
+     (17.6, 1e-3, "17 600 times the limit"), (3.0, 1e-9, "3.00e+09 times the limit")],
+)  # fmt: skip
+def test_a_miss_by_far_is_told_as_a_multiple(value: float, limit: float, shown: str) -> None:
+    row = cast(RequirementResult, SimpleNamespace(value=value, limit=limit))
+    assert margin_text(row).replace("\u00a0", " ") == shown
+
+
+@pytest.mark.parametrize(
+    ("value_m", "shown"),
+    [(5.074e-4, "507.4 um"), (9.9e-5, "99000 nm"), (0.2945, "294.5 mm"), (2e-9, "2 nm")],
+)
+def test_a_figure_keeps_the_unit_of_its_limit_while_it_can_be_read(
+    value_m: float, shown: str
+) -> None:
+    assert beside("1 nm", value_m, "m") == shown
 
 
 def test_those_that_fail_are_named_where_the_table_is_long() -> None:

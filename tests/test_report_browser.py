@@ -469,6 +469,7 @@ def test_figures_and_tables_can_be_taken_away(browser: Any, report: Path, tmp_pa
         rows = list(csv.reader(taken["CSV"].read_text("utf-8").splitlines()))
         verdict = samples.fixed_wing()
         assert [row[0] for row in rows] == ["Requirement", *(r.id for r in verdict.requirements)]
+        assert {row[1] for row in rows[1:]} <= {"pass", "fail"}
         assert [url for url in opened.requests if not url.startswith("data:")] == [report.as_uri()]
         assert opened.console == []
 

@@ -17,9 +17,15 @@ from study_specs import SPEC, write
 from syncline_design.report.charts_study import cost_map, sampled_cases
 from syncline_design.report.on_study import on_study
 from syncline_design.report.render_console import console
+from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.studies import render_study
-from syncline_design.report.study_words import MOST_ACROSS, heat_table, winners_table
+from syncline_design.report.study_words import (
+    MOST_ACROSS,
+    heat_table,
+    short_key,
+    winners_table,
+)
 from syncline_design.studies import StudyResult, StudySettings, run_study
 from syncline_design.studies.scatter import scatter
 from syncline_design.studies.summary import HeatMap, heat_map, summarise
@@ -109,6 +115,50 @@ def test_named_axes_and_words_are_kept(tmp_path: Path) -> None:
     assert found.others == ("stages[uav].v_max",)
     picture = sampled_cases(found, "EUR").svg
     assert "velodyne_hdl32e" in picture
+
+
+def test_a_scale_of_few_prices_shows_them_and_a_mark_that_meets_is_filled(tmp_path: Path) -> None:
+    found = scatter(summarise(done(tmp_path, SAMPLE.format(count=40, more=WORDS), SPEC)))
+    assert found is not None
+    svg = sampled_cases(found, "EUR").svg
+    costs = {point.cost for point in found.points if point.cost is not None}
+    assert 1 < len(costs) < 4
+    for cost in costs:
+        assert f"{cost:,.0f}".replace(",", "\u00a0") in svg
+    strengths = {float(one) for one in re.findall(r"fill-opacity: ([\d.]+)", svg)}
+    assert strengths
+    assert min(strengths) > 0.15
+
+
+@pytest.mark.parametrize(
+    ("key", "shown"),
+    [
+        ("stages[uav].distance", "uav.distance"),
+        ("stages[uav].ranging.sensor", "uav.ranging.sensor"),
+        ("requirements[ACC-1].limit", "ACC-1 limit"),
+        ("catalog.sensors[apogee].cost", "apogee cost"),
+        ("stages[0].distance", "stages[0].distance"),
+        ("coverage_factor", "coverage_factor"),
+    ],
+)
+def test_a_key_path_has_a_short_name_that_no_other_has(key: str, shown: str) -> None:
+    assert short_key(key) == shown
+
+
+def test_a_front_of_a_case_that_many_keys_tell_apart_is_named_by_its_number(
+    tmp_path: Path,
+) -> None:
+    """Of four keys a legend would be cut before it says what differs."""
+    more = '    "stages[uav].omega_max": 9 deg/s .. 60 deg/s\n    "coverage_factor": 1 .. 2\n'
+    result = done(tmp_path, SAMPLE.format(count=9, more=more), SPEC)
+    page = html(on_study(result))
+    legend = page[page.index('id="fig-fronts-legend') :]
+    names = set(re.findall(r">(case \d)<", legend.partition("</svg>")[0]))
+    assert names == {f"case {case.number}" for case in result.cases() if case.record.front}
+    assert len(names) > 1
+    told = page[page.index("What varies</h2>") :]
+    assert "stages[uav].omega_max" in told
+    assert "stages[" not in page.partition("What varies</h2>")[0]
 
 
 def test_a_sample_crossed_with_a_grid_keeps_its_map(tmp_path: Path) -> None:
@@ -260,6 +310,6 @@ def test_a_map_names_both_factors_on_a_narrow_console(
     monkeypatch.setenv("COLUMNS", str(width))
     text = console(on_study(done(tmp_path, GRID.format(across=5, up=5))), colour=False)
     block = text[text.index("Least cost of a payload") :].split("\n\n")[0]
-    assert "stages[uav].distance" in block
-    assert "requirements[ACC-1].limit" in block
+    assert "uav.distance" in block
+    assert "ACC-1 limit" in block
     assert max(map(len, block.splitlines())) <= width

@@ -51,14 +51,20 @@
   });
 
   // A table that goes on beyond its frame stands as cards where that is as narrow as a phone, or closer, or says so.
-  var phone = window.matchMedia("(max-width: 34rem)"), narrow = 31.5 * 16;
+  var phone = window.matchMedia("(max-width: 34rem)"), tablet = window.matchMedia("(max-width: 55.99rem)"), narrow = 31.5 * 16;
   function cut(frame) { return frame.scrollWidth > frame.clientWidth + 1; }
+  function turn(frame, how) {
+    if (!cut(frame)) { return; }
+    frame.classList.add(how);
+    frame.dataset.turned = (frame.dataset.turned || "") + " " + how;
+  }
   function hint(frame) {
-    var few = frame.matches(".inner") || frame.querySelector("tbody").rows.length <= 300;
-    frame.classList.remove("tight");
-    if (frame.dataset.turned) { frame.classList.remove("cards"); }
-    if ((phone.matches || frame.clientWidth <= narrow) && few && cut(frame)) { frame.classList.add("cards"); frame.dataset.turned = "yes"; }
-    if (cut(frame)) { frame.classList.add("tight"); }
+    (frame.dataset.turned || "").split(" ").filter(Boolean).forEach(function (how) { frame.classList.remove(how); });
+    delete frame.dataset.turned;
+    if (phone.matches || frame.clientWidth <= narrow) { turn(frame, "cards"); }
+    turn(frame, "tight");
+    if (tablet.matches) { turn(frame, "wide"); }
+    turn(frame, "broken");
     frame.classList.toggle("more", cut(frame));
     frame.classList.toggle("down", frame.matches(".inner, .long") && frame.scrollHeight > frame.clientHeight + 1);
   }
@@ -94,7 +100,7 @@
   open();
 
   // Figures: what a point or a bar says shows under the pointer, and by arrow keys.
-  var SVG = "http://www.w3.org/2000/svg", MANY = 1000;
+  var SVG = "http://www.w3.org/2000/svg", MANY = 1000, said = new Map();
 
   function span(text, bold) {
     var piece = document.createElement(bold ? "b" : "span");
@@ -105,6 +111,7 @@
   function tips(drawing) {
     var data = JSON.parse(drawing.dataset.points), svg = drawing.querySelector("svg");
     drawing.removeAttribute("data-points");
+    said.set(drawing, data);
     var rows = data.rows, size = svg.viewBox.baseVal, shown = -1, tip = null, ring = null;
     var order = rows.map(function (_, k) { return k; }).sort(function (a, b) {
       return rows[a][0] - rows[b][0] || rows[a][1] - rows[b][1];
@@ -236,17 +243,36 @@
     image.src = "data:image/svg+xml;charset=utf-8," + encodeURIComponent(alone(svg));
   }
 
+  // What a cell says as a spreadsheet reads it: no symbol before the words, figures without gaps, a plain minus.
   function field(cell) {
-    var copy = cell.querySelector(".cell") || cell;
-    var text = copy.textContent.replace(/[\u00a0\s]+/g, " ").trim();
+    var copy = (cell.querySelector(".cell") || cell).cloneNode(true), mark = copy.querySelector(".mark");
+    if (mark && copy.textContent.trim() !== mark.textContent.trim()) { mark.remove(); }
+    copy.querySelectorAll(".sub").forEach(function (sub) { sub.prepend(" ("); sub.append(")"); });
+    return quoted(copy.textContent);
+  }
+
+  function quoted(words) {
+    var text = words.replace(/(\d)\u00a0(?=\d{3}(?!\d))/g, "$1").replace(/\u2212/g, "-").replace(/[\u00a0\s]+/g, " ").trim();
     if (/^[=+@\t-]/.test(text) && isNaN(Number(text.split(" ")[0]))) { text = "'" + text; }
     return /[",\n]/.test(text) ? '"' + text.replace(/"/g, '""') + '"' : text;
   }
 
-  function csv(table) {
-    return Array.prototype.map.call(table.rows, function (row) {
-      return Array.prototype.map.call(row.cells, field).join(",");
-    }).join("\r\n") + "\r\n";
+  function csv(rows) {
+    return rows.map(function (row) { return row.join(","); }).join("\r\n") + "\r\n";
+  }
+
+  function shown(table) {
+    return Array.prototype.map.call(table.rows, function (row) { return Array.prototype.map.call(row.cells, field); });
+  }
+
+  // Of the values of a figure the table shows the first and the last; the file holds them all.
+  function every(frame, table) {
+    var figure = frame.matches(".inner") && frame.closest("figure");
+    var data = figure && said.get(figure.querySelector(".drawing"));
+    if (!data || data.rows.length < table.rows.length) { return shown(table); }
+    return [data.labels.map(quoted)].concat(data.rows.map(function (row) {
+      return data.labels.map(function (_, k) { return quoted(data.words[row[4 + k]]); });
+    }));
   }
 
   function offer(choices) {
@@ -275,7 +301,7 @@
     var table = frame.querySelector("table"), title = frame.getAttribute("aria-label");
     var row = offer([["CSV", title, function () {
       var name = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").slice(0, 50);
-      save(new Blob([csv(table)], { type: "text/csv" }), stem() + "-" + name + ".csv");
+      save(new Blob([csv(every(frame, table))], { type: "text/csv" }), stem() + "-" + name + ".csv");
     }]]), before = frame.previousElementSibling;
     var over = before && /^H[23]$/.test(before.tagName) && table.querySelector("caption .unseen");
     row.classList.toggle("over", Boolean(over));
@@ -312,10 +338,14 @@
     return clamp(box[0] + share * (box[1] - box[0]), box[0], box[1]);
   }
 
+  function share(error) { return (-Math.log10(error) - box[6]) / (box[7] - box[6]); }
+
   function down(error) {
-    var share = (-Math.log10(error) - box[6]) / (box[7] - box[6]);
-    return clamp(box[3] - share * (box[3] - box[2]), box[2], box[3]);
+    return clamp(box[3] - share(error) * (box[3] - box[2]), box[2], box[3]);
   }
+
+  // A limit beyond the frame is drawn at its edge.
+  function beyond(limit) { return share(limit) > 1 ? " \u2191" : share(limit) < 0 ? " \u2193" : ""; }
 
   function quantity(value, units) {
     for (var i = units.length - 1; i > 0; i -= 1) {
@@ -336,7 +366,7 @@
   // In the unit of the limit, where the spec writes one and the figure is readable in it.
   function besideLimit(value) {
     var amount = value / limitSize;
-    return amount >= 1e-3 && amount < 1e6 ? quantity(value, [[limitSize, data.limitUnit]]) : length(value);
+    return amount >= 1e-4 && amount < 1e5 ? quantity(value, [[limitSize, data.limitUnit]]) : length(value);
   }
 
   // The sliders run over logarithms; without a script they never show.
@@ -381,7 +411,7 @@
       shift(label, 0, down(limit) - down(limit0));
       var text = label ? label.querySelector("text") : null;
       var said = changed ? besideLimit(limit) : data.limitShown;
-      if (text) { text.textContent = "limit " + said; }
+      if (text) { text.textContent = "limit " + said + beyond(limit); }
       document.getElementById("limit-value").textContent = said;
       limitSlider.setAttribute("aria-valuetext", said);
     }

@@ -9,7 +9,7 @@ from syncline_design.model.figure_text import format_like, format_quantity
 from syncline_design.model.quantity import Dimension, UnitError, parse_quantity
 
 DIMENSIONS: Final = {"m": Dimension.LENGTH, "kg": Dimension.MASS, "W": Dimension.POWER}
-_LEAST, _MOST = 1e-4, 1e6  # of the written unit: beyond them the ladder reads better
+_LEAST, _MOST = 1e-4, 1e5  # of the written unit: beyond them the ladder reads better
 
 
 def limit_as_written(written: str | None, limit: float, unit: str) -> str | None:
@@ -31,7 +31,7 @@ def beside(written: str, value: float, unit: str, digits: int = 4) -> str:
     """A figure [SI unit] in the unit of the text `written`.
 
     By its ladder where that would make it unreadable: below a ten-thousandth of the unit, and from
-    a million on.
+    a hundred thousand on.
     """
     dimension = DIMENSIONS[unit]
     one = float(parse_quantity(f"1 {written.split()[1]}", dimension))

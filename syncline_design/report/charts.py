@@ -76,7 +76,9 @@ def syncline(
 
 def _set_accuracy_limits(axes: Axes, curve: SynclineCurve, worst_m: float) -> None:
     asked = None if curve.limit is None else curve.limit.limit
-    errors = [curve.floor_m, worst_m, *(e for e in (asked, curve.total_m) if e)]
+    errors = [curve.floor_m, worst_m, *([curve.total_m] if curve.total_m else [])]
+    if asked and min(errors) / FAR <= asked <= max(errors) * FAR:
+        errors.append(asked)
     axes.set_ylim(1.0 / (max(errors) * 1.3), 2.5 / min(errors))
 
 
@@ -144,15 +146,19 @@ def _limit_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
     left, right = axes.get_xlim()
     asked = None if curve.limit is None else curve.limit.limit
     if curve.limit is not None and asked:
-        line = axes.plot([left, right], [1 / asked] * 2, color=WARN, linewidth=1.6)[0]
+        bottom, top = axes.get_ylim()
+        place = min(max(1 / asked, bottom), top)
+        beyond = {bottom: " \N{DOWNWARDS ARROW}", top: " \N{UPWARDS ARROW}"}.get(place, "")
+        line = axes.plot([left, right], [place] * 2, color=WARN, linewidth=1.6)[0]
         line.set_gid("limit-line")
+        above = place == bottom or (place < top and asked < curve.floor_m)
         label = axes.annotate(
-            f"limit {numbers.limit(curve.limit)}",
-            (right, 1 / asked),
-            xytext=(-4, 4 if asked < curve.floor_m else -4),
+            f"limit {numbers.limit(curve.limit)}{beyond}",
+            (right, place),
+            xytext=(-4, 4 if above else -4),
             textcoords="offset points",
             ha="right",
-            va="bottom" if asked < curve.floor_m else "top",
+            va="bottom" if above else "top",
             color=WARN,
         )
         label.set_gid("limit-label")
@@ -208,6 +214,7 @@ def _describe(curve: SynclineCurve) -> str:
 
 LONG_NAME: Final = 24  # letters of a sensor beside its bar
 LAX: Final = 5.0  # times all that is drawn, from which on a limit is told at the edge
+FAR: Final = 100.0  # times what a logarithmic axis holds, from which on it does the same
 BEYOND: Final = " \N{RIGHTWARDS ARROW}"
 
 

@@ -20,6 +20,12 @@ LEVEL = 0.075  # of the height of a distribution: what a line of text takes
 LETTER = 0.0185  # of its width: what a letter takes
 
 
+def _span_of(low_m: float, high_m: float, limit: numbers.Limited | None) -> str:
+    """`0 mm to 9.93 mm`: nothing at all in the unit of the other end."""
+    high = numbers.error(high_m, limit, 3)
+    return f"{numbers.error(low_m, limit, 3) if low_m else numbers.like(high, 0.0)} to {high}"
+
+
 @dataclass(frozen=True, slots=True)
 class DensityBars:
     """Density of the simulated error over bins, with marks on the error axis."""
@@ -65,8 +71,7 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineChart:
         top = max(data.density, default=1.0) or 1.0
         for density, low, high in zip(data.density, data.edges_m, data.edges_m[1:], strict=False):
             tell(axes, (low, high), (0.0, density), [
-                ("Error", f"{numbers.error(low, data.limit, 3)} to "
-                          f"{numbers.error(high, data.limit, 3)}"),
+                ("Error", _span_of(low, high, data.limit)),
                 ("Share of samples", numbers.percent(density * (high - low), 3)),
             ])  # fmt: skip
         axes.stairs(data.density, data.edges_m, fill=True, color=SERIES[0], alpha=0.35, zorder=2)

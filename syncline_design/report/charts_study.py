@@ -14,6 +14,7 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
+from syncline_design.report.study_words import short_key
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 from syncline_design.report.words import BRIEF
@@ -26,7 +27,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Says = Sequence[Sequence[tuple[str, str]]]  # of every point: labels and values
-_FAINT, _STRONG = 0.08, 0.5  # opacity of the cheapest and the dearest cell: text stays readable
+CELL = (0.08, 0.5)  # opacity of the cheapest and of the dearest cell: text stays readable
+MARK = (0.2, 0.9)  # of marks, in which nothing is written: the cheapest is seen to be filled
+MOST_PATCHES = 5  # of a scale of prices
+MOST_LABEL = 44  # characters of a front's in a legend
 MOST_TEXT = 8  # cells across in which the cost itself still fits
 PATCH = 24.0  # of the scale, with what is around it [SVG units]
 ACROSS = 262.0  # all cells, beside the labels of the rows [SVG units]
@@ -45,7 +49,7 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
                 words = _amount(cost or 0.0, whole) if across <= MOST_TEXT else ""
                 _cell(axes, (x, y), cost, costs, words)
                 tell(axes, (x - 0.5, x + 0.5), (y - 0.5, y + 0.5), [
-                    (heat.x, heat.x_values[x]), (heat.y, heat.y_values[y]),
+                    (short_key(heat.x), heat.x_values[x]), (short_key(heat.y), heat.y_values[y]),
                     ("Least cost", "no case is known to meet" if cost is None
                      else numbers.money(cost, heat.currency)),
                     ("Payload", heat.payload[y][x]),
@@ -54,8 +58,8 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
         axes.set_ylim(-0.5, len(heat.y_values) - 0.5)
         _label_axis(axes, "x", heat.x_values)
         _label_axis(axes, "y", heat.y_values)
-        axes.set_xlabel(shortened(heat.x, 60))
-        axes.set_ylabel(shortened(heat.y, 40))
+        axes.set_xlabel(shortened(short_key(heat.x), 60))
+        axes.set_ylabel(shortened(short_key(heat.y), 40))
         _cost_scale(figure, costs, heat.currency, whole)
 
     spoken = "No case meets its requirements."
@@ -141,7 +145,7 @@ def fronts(
             y = [point.error_m for point in (*front.points, front.points[-1])]
             colour, style = SERIES[index % len(SERIES)], styles[index // 2 % len(styles)]
             axes.step(x, y, where="post", color=colour, linestyle=style, linewidth=1.8,
-                      label=shortened(front.label, 44))  # fmt: skip
+                      label=shortened(front.label, MOST_LABEL))  # fmt: skip
             axes.plot(x[:-1], y[:-1], "o", color=colour, markersize=3.5)
             for point in front.points:
                 tell(axes, point.cost, point.error_m, [
@@ -156,15 +160,21 @@ def fronts(
         _count_axis(axes)
         axes.set_xlabel(f"cost [{currency}]")
         axes.set_ylabel("Syncline error")
-        figure.legend(loc="outside lower left", ncols=1)
+        figure.legend(loc="outside lower left", ncols=1 if any(map(_long, shown)) else 2)
 
     errors = [point.error_m for front in shown for point in front.points]
     spoken = (
         f"{len(shown)} exact fronts; errors from {numbers.error(min(errors), limit)} to "
         f"{numbers.error(max(errors), limit)}. The table holds their ends."
     )
-    size = (WIDTH, 300.0 + 17.0 * len(shown))
+    lines = len(shown) if any(map(_long, shown)) else -(-len(shown) // 2)
+    size = (WIDTH, 300.0 + 17.0 * lines)
     return draw(name, "Cost against error, front by case", spoken, size, build)
+
+
+def _long(front: NamedFront) -> bool:
+    """Whether its label needs a line of the legend for itself."""
+    return len(front.label) > MOST_LABEL // 2
 
 
 def _count_axis(axes: Axes) -> None:
@@ -206,7 +216,7 @@ def sampled_cases(
         _scatter_axis(axes, "x", data.x)
         _scatter_axis(axes, "y", data.y)
         scales.grid(axes)
-        _cost_scale(figure, costs, currency)
+        _cost_scale(figure, costs, currency, ends=MARK)
         figure.legend(loc="outside lower left", ncols=2)
 
     spoken = f"{len(meeting)} of {len(data.points)} sampled cases meet their requirements."
@@ -221,7 +231,7 @@ def _meeting(
     """Cases that meet: a shape for each value of what else varies, all of one strength at once."""
     groups: dict[tuple[int, float], list[ScatterPoint]] = {}
     for point in meeting:
-        strength = round(_strength(point.cost, costs) / STEP) * STEP
+        strength = round(_strength(point.cost, costs, MARK) / STEP) * STEP
         groups.setdefault((point.kind, strength), []).append(point)
     for (kind, strength), points in groups.items():
         places = [p.x for p in points], [p.y for p in points]
@@ -231,12 +241,13 @@ def _meeting(
     for kind in sorted({kind for kind, _ in groups}):
         count = sum(p.kind == kind for p in meeting)
         which = f": {shortened(data.kinds[kind], 26)}" if data.kinds else ""
-        axes.plot([], [], SHAPES[kind % len(SHAPES)], markersize=7, markerfacecolor="none",
+        axes.plot([], [], SHAPES[kind % len(SHAPES)], markersize=7,
+                  markerfacecolor=(SERIES[0], sum(MARK) / 2),
                   markeredgecolor=SERIES[0], label=f"meets{which} ({count})")  # fmt: skip
 
 
 def _scatter_axis(axes: Axes, which: Literal["x", "y"], axis: ScatterAxis) -> None:
-    label = f"{shortened(axis.key, 60 if which == 'x' else 40)}" + (
+    label = f"{shortened(short_key(axis.key), 60 if which == 'x' else 40)}" + (
         f" [{axis.unit}]" if axis.unit else ""
     )
     if which == "x":
@@ -254,28 +265,42 @@ def _scatter_axis(axes: Axes, which: Literal["x", "y"], axis: ScatterAxis) -> No
         scales.set_ticks(axes, which, scales.log_ticks(low, high), lambda p: numbers.number(p, 6))
 
 
-def _strength(cost: float | None, costs: Sequence[float]) -> float:
+def _strength(
+    cost: float | None, costs: Sequence[float], ends: tuple[float, float] = CELL
+) -> float:
     """Opacity of a cost between the cheapest and the dearest."""
+    faint, strong = ends
     if cost is None or not costs:
-        return _FAINT
+        return faint
     span = (max(costs) - min(costs)) or 1.0
-    return _FAINT + (_STRONG - _FAINT) * (cost - min(costs)) / span
+    return faint + (strong - faint) * (cost - min(costs)) / span
 
 
-def _cost_scale(figure: Figure, costs: Sequence[float], currency: str, whole: bool = True) -> None:
+def _cost_scale(
+    figure: Figure, costs: Sequence[float], currency: str, whole: bool = True,
+    ends: tuple[float, float] = CELL,
+) -> None:  # fmt: skip
     """Patches from the cheapest to the dearest, labelled; nothing where all cost the same."""
     if len(set(costs)) < 2:
         return
     from matplotlib.patches import Rectangle
 
-    low, high = min(costs), max(costs)
-    patches_across = 5 if not whole or 5 * (_room(costs) + PATCH) <= ACROSS else 3
-    steps = [low + (high - low) * k / (patches_across - 1) for k in range(patches_across)]
+    steps = _steps(costs, whole)
     patches = [
-        Rectangle((0, 0), 1, 1, facecolor=SERIES[0], alpha=_strength(cost, costs), linewidth=0)
+        Rectangle((0, 0), 1, 1, edgecolor=SERIES[0], linewidth=0.8,
+                  facecolor=(SERIES[0], _strength(cost, costs, ends)))
         for cost in steps
-    ]
+    ]  # fmt: skip
     words = [_amount(cost, whole) for cost in steps]
     words[-1] += f" {currency}" if whole else f" thousand {currency}"
-    figure.legend(patches, words, loc="outside upper left", ncols=5,
+    figure.legend(patches, words, loc="outside upper left", ncols=MOST_PATCHES,
                   handlelength=1.2, columnspacing=0.8, handletextpad=0.4)  # fmt: skip
+
+
+def _steps(costs: Sequence[float], whole: bool) -> list[float]:
+    """The prices themselves where a scale has room for them all, else steps between the ends."""
+    across = MOST_PATCHES if not whole or MOST_PATCHES * (_room(costs) + PATCH) <= ACROSS else 3
+    found = sorted(set(costs))
+    if len(found) <= across:
+        return found
+    return [found[0] + (found[-1] - found[0]) * k / (across - 1) for k in range(across)]

@@ -98,6 +98,8 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
         level = "not_reached"
     place = (row.line or 1, row.column or 1)
     known, why = verdict.baseline, waiver_text(row)
+    if level == "fail" and row.waiver and row.waiver.expired:
+        message += f"; {why}"
     if level in ("fail", "undecided") and known is not None and known.forgives(row.id):
         level, why = "known", f"no worse than in {known.file}"
     return Notice(level, row.kind, row.id, verdict.file, *place, message, why, _figures(row))
@@ -107,7 +109,7 @@ def _figures(row: RequirementResult) -> tuple[tuple[str, str], ...]:
     """What a requirement is held at, at full precision; what has no figure is left out."""
     known = (("limit", row.limit), ("value", row.value), ("margin", row.margin))
     shown = [(name, repr(value)) for name, value in known if numbers.finite(value) is not None]
-    return (*shown, ("unit", row.unit), ("status", row.status))
+    return (*shown, ("unit", row.unit), ("status", "waived" if row.is_waived else row.status))
 
 
 def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:

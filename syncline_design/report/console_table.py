@@ -12,6 +12,7 @@ from syncline_design.report.text import unbroken, visible
 
 GAP: Final = "  "
 _LONGEST_WORD: Final = 28  # a longer one does not hold its column open
+_JOINTS: Final = "_-./:\\"
 _MEASURED: Final = 60  # rows whose height decides
 
 Paint = Callable[[str, str], str]
@@ -102,7 +103,10 @@ def _row(
     paint: Paint | None,
 ) -> Iterator[str]:
     """A row in as many lines as its longest cell takes."""
-    lines = [folded(text, width) for text, width in zip(cells, widths, strict=True)]
+    lines = [
+        [part for line in folded(text, width) for part in _parts(line, width)]
+        for text, width in zip(cells, widths, strict=True)
+    ]
     for parts in zip_longest(*lines, fillvalue=""):
         padded = [
             text.rjust(width) if flush else text.ljust(width)
@@ -111,6 +115,16 @@ def _row(
         if paint is not None:
             padded = [paint(text, tone) for text, tone in zip(padded, tones, strict=True)]
         yield GAP.join(padded).rstrip()
+
+
+def _parts(word: str, width: int) -> Iterator[str]:
+    """A word that is longer than its column in parts, cut where it is joined if that can be."""
+    while len(word) > width:
+        joint = max(word.rfind(mark, 0, width) for mark in _JOINTS)
+        cut = joint + 1 if joint >= width // 2 else width
+        yield word[:cut]
+        word = word[cut:]
+    yield word
 
 
 def _records(heads: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> Iterator[str]:

@@ -174,6 +174,13 @@ def percent(fraction: Any, digits: int = 3) -> str:
     return typeset(figure_text.percent(amount, digits))
 
 
+def times(factor: float) -> str:
+    """`17 600 times`; from a thousand million on by a power of ten."""
+    if factor >= 1e9:
+        return typeset(f"{figure_text.to_power(factor, 3)} times")
+    return f"{count(figure_text.rounded(factor, 3))}\N{NO-BREAK SPACE}times"
+
+
 def in_unit(value: Any, unit: str, digits: int = 4) -> str:
     """A requirement's figure: lengths, times, masses and powers by their ladder, else as it is."""
     match unit:

@@ -28,7 +28,10 @@ from syncline_design.report.study_words import (
     heat_table,
     outcome,
     rule_sentence,
+    setting,
+    short_key,
     shown_value,
+    varied_table,
     winners_table,
 )
 from syncline_design.report.svg import InlineChart
@@ -79,6 +82,7 @@ def on_study(result: StudyResult) -> Document:
             *section("ends", "Where feasibility ends", _ends(summary), "Where it ends"),
             *section("fronts", "Cost against error, front by case", _fronts(summary), "Fronts"),
             *section("cases", "Cases", cases),
+            *section("varied", "What varies", show(varied_table(summary), silent=True)),
             *provenance(_provenance(result)),
         ),
     )  # fmt: skip
@@ -127,8 +131,8 @@ def _says(
     brief: Brief, several: list[tuple[int, Factor]], limit: numbers.Limited | None
 ) -> list[tuple[str, str]]:
     """A case in words: number, setting, answer, price, error, payload."""
-    setting = [(factor.key, shown_value(factor, brief.labels[i])) for i, factor in several]
-    found = [("Case", str(brief.number)), *setting, ("Verdict", brief.verdict)]
+    values = [(short_key(f.key), shown_value(f, brief.labels[i])) for i, f in several]
+    found = [("Case", str(brief.number)), *values, ("Verdict", brief.verdict)]
     if brief.cost is not None:
         found.append(("Price", numbers.money(brief.cost, brief.currency)))
     if brief.error_m is not None:
@@ -147,7 +151,7 @@ def _fronts(summary: StudySummary) -> list[Node]:
     chosen = _distinct_fronts(summary)
     nodes: list[Node] = []
     if len({front.currency for front in chosen}) == 1:
-        named = [charts_study.NamedFront(_common(summary, f), f.points) for f in chosen]
+        named = [charts_study.NamedFront(_name(summary, f)[0], f.points) for f in chosen]
         draw = partial(charts_study.fronts, named, chosen[0].currency, summary.accuracy)
         caption = "At most eight fronts are drawn; the table has all that differ."
         nodes.append(Chart("fronts", draw, caption))
@@ -180,17 +184,27 @@ def _common(summary: StudySummary, front: StudyFront) -> str:
     for place, factor in varied(summary):
         values = {brief.labels[place] for brief in chosen}
         if len(values) == 1:
-            parts.append(f"{factor.key} = {values.pop()}")
+            parts.append(setting(factor, values.pop()))
     return visible(", ".join(parts)) or "every case"
+
+
+def _name(summary: StudySummary, front: StudyFront) -> tuple[str, str]:
+    """What a front is called in a legend, and in full where that is too long for one."""
+    words = _common(summary, front)
+    if len(words) <= charts_study.MOST_LABEL:
+        return words, ""
+    if len(front.cases) == 1:
+        return f"case {front.cases[0]}", words
+    return f"front {summary.fronts.index(front) + 1}", words
 
 
 def _fronts_table(summary: StudySummary) -> Table:
     rows, limit = [], summary.accuracy
     for front in summary.fronts:
         cheapest, finest = front.points[0], front.points[-1]
-        currency = front.currency
+        currency, (called, words) = front.currency, _name(summary, front)
         rows.append((
-            Cell(_common(summary, front)),
+            Cell(called, sub=words),
             Cell(numbers.count(len(front.cases)), float(len(front.cases))),
             Cell(numbers.count(len(front.points)), float(len(front.points))),
             Cell(numbers.money(cheapest.cost, currency), cheapest.cost),
@@ -217,7 +231,11 @@ def _sampled_caption(data: Scatter) -> str:
         "Computed cases only. A filled mark meets its requirements, the stronger its colour the "
         "dearer; a cross does not."
     )
-    return text + (f" Vary besides: {sentence_list(list(data.others))}." if data.others else "")
+    return text + (
+        f" Vary besides: {sentence_list([short_key(key) for key in data.others])}."
+        if data.others
+        else ""
+    )
 
 
 def _case_table(summary: StudySummary) -> Table:
@@ -238,7 +256,11 @@ def _case_table(summary: StudySummary) -> Table:
             Cell(numbers.error(brief.error_m, limit), brief.error_m),
             Cell(why),
         ])  # fmt: skip
-    keys = [factor.key for _, factor in several] if len(several) <= MOST_KEYS else ["Setting"]
+    keys = (
+        [short_key(factor.key) for _, factor in several]
+        if len(several) <= MOST_KEYS
+        else ["Setting"]
+    )
     varying = [*(["Base"] if many else []), *keys]
     ends = ["Verdict", "Price #", "Syncline error #", "Payload, or why there is none"]
     heads = ["Case #", *varying, *ends]
@@ -251,7 +273,7 @@ def _setting_cells(brief: Brief, several: list[tuple[int, Factor]]) -> list[Cell
     """What varies: a cell per key, or one cell that names them all."""
     if len(several) <= MOST_KEYS:
         return [Cell(shown_value(f, brief.labels[i]), _figure(brief, i)) for i, f in several]
-    return [Cell("; ".join(f"{f.key} = {shown_value(f, brief.labels[i])}" for i, f in several))]
+    return [Cell("; ".join(setting(f, brief.labels[i]) for i, f in several))]
 
 
 def _provenance(result: StudyResult) -> list[tuple[str, str]]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from typing import Final
+
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
@@ -13,6 +16,7 @@ from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (
     HeatMap,
     StudySummary,
+    Winner,
     boundaries,
     varied,
     winners,
@@ -23,12 +27,46 @@ MOST_ACROSS = 8  # columns of figures in any table: more fit neither page nor co
 MOST_DOWN = 20  # of tables on the console
 MOST_KEYS = 3  # columns of their own for what varies; of more, one column names them all
 LEAST_COST = "Least cost of a payload that meets the requirements"
+_NAMED: Final = re.compile(r"([\w.]+)\[([^\]\d][^\]]*)\]\.(.+)")  # by its name, not by a number
 _COMBINED = "cannot be as combined"  # a case that is refused
 _WHEN = {
     "all": "every case meets its requirements",
     "any": "at least one case meets its requirements",
     "decided": "every case gets an answer",
 }
+
+
+def short_key(key: str) -> str:
+    """A key path as a figure and a table name it: `uav.distance`, `ACC-1 limit`."""
+    found = _NAMED.fullmatch(key)
+    if found is None:
+        return key
+    place, name, rest = found.groups()
+    return f"{name}{'.' if place == 'stages' else ' '}{rest}"
+
+
+def setting(factor: Factor, label: str) -> str:
+    """What a key is set to: `uav.distance 55.06 m`."""
+    return f"{short_key(factor.key)} {shown_value(factor, label)}"
+
+
+def varied_table(summary: StudySummary) -> Table:
+    """What varies: short name, key path of the spec, how many values between which ends."""
+    rows = [
+        [Cell(short_key(factor.key)), Cell(factor.key, code=True),
+         Cell(str(len(factor.axis)), float(len(factor.axis))), Cell(_values_of(factor))]
+        for _, factor in varied(summary)
+    ]  # fmt: skip
+    return table("What varies", ["Name", "In the spec", "Values #", "Which"], rows)
+
+
+def _values_of(factor: Factor) -> str:
+    """`30 m to 120 m`; what is no figure one by one."""
+    shown = [shown_value(factor, label) for label in factor.axis]
+    if factor.is_of_figures and len(shown) > MOST_KEYS:
+        return f"{shown[0]} to {shown[-1]}"
+    more = f" and {len(shown) - MOST_ACROSS} more" if len(shown) > MOST_ACROSS else ""
+    return ", ".join(shown[:MOST_ACROSS]) + more
 
 
 def outcome(result: StudyResult) -> Outcome:
@@ -77,7 +115,7 @@ def currency_sentence(summary: StudySummary) -> str:
 
 def heat_table(heat: HeatMap) -> Table:
     """Least cost over two factors as a table: across and down, or a row per cell where too wide."""
-    across, down, costs = heat.x, heat.y, heat.least_cost
+    across, down, costs = short_key(heat.x), short_key(heat.y), heat.least_cost
     names, sides = heat.x_values, heat.y_values
     if len(names) > MOST_ACROSS and len(sides) <= MOST_ACROSS:
         across, down, names, sides = down, across, sides, names
@@ -110,7 +148,7 @@ def _cell_table(heat: HeatMap) -> Table:
     note = f"In {left} cells no case meets." if left else ""
     note += f" {more} further rows are left out." if more else ""
     note += f" {_undecided_note(heat)}"
-    heads = (heat.y, heat.x, "Least cost #", "Payload")
+    heads = (short_key(heat.y), short_key(heat.x), "Least cost #", "Payload")
     return table(LEAST_COST, heads, rows[:MOST_ROWS], note.strip())
 
 
@@ -133,11 +171,11 @@ def shown_value(factor: Factor, label: str) -> str:
 
 def winners_table(summary: StudySummary) -> Table:
     """Which sensor and method is chosen where."""
-    several = [factor.key for _, factor in varied(summary)]
+    several = [short_key(factor.key) for _, factor in varied(summary)]
     rows = [
         [
             Cell(w.role), Cell(w.name), Cell(w.timestamping),
-            Cell(f"{w.cases} of {w.of}", float(w.cases)), *_where_cells(several, w.where),
+            Cell(f"{w.cases} of {w.of}", float(w.cases)), *_where_cells(several, w),
         ]
         for w in winners(summary, shown_value)
     ]  # fmt: skip
@@ -147,11 +185,14 @@ def winners_table(summary: StudySummary) -> Table:
     return table(caption, heads, rows, named_by=1)
 
 
-def _where_cells(keys: list[str], where: tuple[str, ...]) -> list[Cell]:
+def _where_cells(keys: list[str], winner: Winner) -> list[Cell]:
     """A cell per key, or one that leaves out the keys over which an option wins everywhere."""
     if len(keys) <= MOST_KEYS:
-        return [Cell(text) for text in where]
-    told = [f"{key}: {text}" for key, text in zip(keys, where, strict=True) if text != "everywhere"]
+        return [Cell(text) for text in winner.where]
+    if winner.cases == winner.of:
+        return [Cell("every case that meets")]
+    told = [f"{key} {text}" for key, text in zip(keys, winner.where, strict=True)
+            if text != "everywhere"]  # fmt: skip
     return [Cell("; ".join(told) or "everywhere")]
 
 
@@ -159,8 +200,8 @@ def boundary_table(summary: StudySummary, most: int = MOST_ROWS) -> Table:
     """Where feasibility ends along each factor; equal ends are one row."""
     ends: dict[tuple[str, str, str, str], list[str]] = {}
     for b in boundaries(summary):
-        fixed = "; ".join(f"{key} = {value}" for key, value in b.fixed.items())
-        ends.setdefault((b.factor, b.met, b.missed, b.why), []).append(fixed)
+        fixed = "; ".join(f"{short_key(key)} {value}" for key, value in b.fixed.items())
+        ends.setdefault((short_key(b.factor), b.met, b.missed, b.why), []).append(fixed)
     rows = [
         [*map(Cell, end), Cell(_with_words(fixed), float(len(fixed)))]
         for end, fixed in list(ends.items())[:most]

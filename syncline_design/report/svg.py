@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from xml.etree import ElementTree
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_places
 from syncline_design.report.matplotlib_import import load_matplotlib
 from syncline_design.report.palette import INK, MUTED, SURFACE, VARIABLES
 from syncline_design.report.text import visible
@@ -27,9 +28,12 @@ if TYPE_CHECKING:
 
 _SVG: Final = "http://www.w3.org/2000/svg"
 _XLINK: Final = "http://www.w3.org/1999/xlink"
+_TEXT: Final = f"{{{_SVG}}}text"
 _HREF: Final = f"{{{_XLINK}}}href"
 _COLOUR: Final = re.compile(r"#[0-9a-f]{6}")
 _REFERENCE: Final = re.compile(r"url\(#([^)]+)\)")
+_PLACES: Final = frozenset({"d", "x", "y"})  # attributes
+_LONG: Final = re.compile(r"-?\d+\.\d{3,}")
 _SIZE: Final = re.compile(r"(\d+(?:\.\d+)?)px")
 _DPI: Final = 72.0  # one figure pixel is one SVG unit
 _SHARP: Final = 216.0  # dots per inch of a picture in pixels: three a unit
@@ -203,6 +207,7 @@ def _themed(drawn: str, name: str, title: str, description: str) -> str:
     _strip(root)
     _prefix_ids(root, name)
     _theme(root)
+    _shorten(root)
     _label(root, name, title, description)
     ElementTree.register_namespace("", _SVG)
     ElementTree.register_namespace("xlink", _XLINK)
@@ -257,9 +262,29 @@ def _theme(root: ElementTree.Element) -> None:
         if style is None:
             continue
         themed = _COLOUR.sub(lambda found: _variable(found.group()), style)
-        if element.tag == f"{{{_SVG}}}text":  # smaller where the page draws the figure larger
+        if element.tag == _TEXT:  # smaller where the page draws the figure larger
             themed = _SIZE.sub(r"calc(\1px * var(--fig-text, 1))", themed)
         element.set("style", themed)
+
+
+def _shorten(root: ElementTree.Element) -> None:
+    """The same picture in half the letters: places to a hundredth, one style for marks alike."""
+    for element in root.iter():
+        if element.tag != _TEXT:
+            element.text = (element.text or "").strip()
+        element.tail = (element.tail or "").strip()
+        for attribute in _PLACES & element.attrib.keys():
+            element.set(attribute, _LONG.sub(_hundredth, element.attrib[attribute]))
+        marks = [child.attrib.get("style") for child in element]
+        alike = len(set(marks)) == 1 and {child.tag for child in element} == {f"{{{_SVG}}}use"}
+        if alike and marks[0] and "style" not in element.attrib:
+            element.set("style", marks[0])
+            for child in element:
+                del child.attrib["style"]
+
+
+def _hundredth(found: re.Match[str]) -> str:
+    return to_places(float(found[0]), 2).rstrip("0").rstrip(".")
 
 
 def _variable(colour: str) -> str:

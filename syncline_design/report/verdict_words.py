@@ -24,6 +24,7 @@ from syncline_design.verdict.obstacle import obstacle_sentence
 from syncline_design.verdict.tree import waived_misses
 
 LOOKED_OVER: Final = 8  # requirements that a reader takes in at a glance
+MANY_TIMES: Final = 11.0  # a limit that is missed by more is told so, not by per cent
 NAMED: Final = 6  # of those that fail, by name
 
 if TYPE_CHECKING:
@@ -177,12 +178,14 @@ def relative_margin(row: RequirementResult) -> float | None:
 
 
 def margin_text(row: RequirementResult) -> str:
-    """`12.4 % to spare` or `8.1 % over`."""
+    """`12.4 % to spare` or `8.1 % over`; far beyond a limit `17 600 times the limit`."""
     margin = relative_margin(row)
     if margin is None:
         return numbers.MISSING
     if margin == 0.0:
         return "exactly at the limit"
+    if 1.0 - margin >= MANY_TIMES:
+        return f"{numbers.times(1.0 - margin)} the limit"
     word = "to spare" if margin > 0 else "over"
     return f"{numbers.percent(abs(margin))} {word}"
 
