@@ -173,15 +173,17 @@ def test_a_cause_within_the_while_of_a_word_is_a_word_too(found: Diagnosis) -> N
         assert within_words((other, kept))[1] is kept
 
 
-@pytest.mark.parametrize("what", ["arm", "heading"])
+FAULTS = {
+    "arm": hidden("lever_arm", "position", x_m=0.3, y_m=0.2, z_m=0.0),
+    "heading": hidden("heading_bias", "attitude", bias_rad=0.03),
+    "range": hidden("range_bias", "ranging", bias_m=0.3),
+}
+
+
+@pytest.mark.parametrize("what", FAULTS)
 def test_what_was_knocked_or_disturbed_is_told_with_its_moment(what: str, tmp_path: Path) -> None:
     """Two logs of one drive, the second with the fault, joined at 30 s (and at 60 s)."""
-    drive = scenario("vessel_figure_eights", 5, 100.0, 5.0)
-    fault = (
-        hidden("lever_arm", "position", x_m=0.3, y_m=0.2, z_m=0.0)
-        if what == "arm"
-        else hidden("heading_bias", "attitude", bias_rad=0.03)
-    )
+    drive, fault = scenario("vessel_figure_eights", 5, 100.0, 5.0), FAULTS[what]
     sound, off = make_log(drive), make_log(drive, (fault,))
     spec = tmp_path / "spec.yaml"
     spec.write_text(sound.spec_yaml(), encoding="utf-8")
@@ -203,7 +205,8 @@ def test_what_was_knocked_or_disturbed_is_told_with_its_moment(what: str, tmp_pa
         assert one.sentence.endswith(", as after a knock")
         assert one.parameters["x_m"].value == pytest.approx(0.3, abs=0.05)
     else:
-        assert one.effect == "heading_bias"
+        ((name, value),) = fault.parameters
+        assert one.effect == fault.effect
         assert one.to_s == pytest.approx(60.0, abs=0.5)
-        low, high = one.parameters["bias_rad"].interval95 or (0.0, 0.0)
-        assert low < 0.03 < high
+        low, high = one.parameters[name].interval95 or (0.0, 0.0)
+        assert low < float(value) < high

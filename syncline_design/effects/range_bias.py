@@ -46,6 +46,7 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=40,
+    passing=True,
     commissioned=("ranging",),
     comes_with="sensor",
     asked_in_stretches=True,
