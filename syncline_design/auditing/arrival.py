@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.alternations import turns_of
 from syncline_design.auditing.cadence import Cadence, about_rhythm, without_losses
 from syncline_design.auditing.frames import FRAMES_S, FULL_SPEED_S, Framed, framed
-from syncline_design.auditing.grains import grain_of
+from syncline_design.auditing.grains import grain_of, may_be_cut
 from syncline_design.auditing.late_scatter import Waits, long_waits_of, waits_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, in_words, seconds, spread
@@ -125,7 +125,8 @@ def hidden_in(series: Series, pace: Cadence, ticks: Paced | None = None) -> Hidd
     found = framed(when)
     if found is not None:
         return _hidden_frame(found)
-    return _hidden_turn(series, pace) or _hidden_wait(when, transport, pace)
+    told = _hidden_turn(series, pace) or _hidden_wait(when, transport, pace)
+    return told or _hidden_grid(may_be_cut(series, pace))
 
 
 def _hidden_wait(when: Array, transport: float, pace: Cadence) -> Hidden | None:
@@ -151,6 +152,14 @@ def _hidden_turn(series: Series, pace: Cadence) -> Hidden | None:
     return Hidden(grain / NS, f"whether a timer of {in_words(grain / NS)} stamped it: {few} from "
                   "the others by one such tick, as where a sensor's clock drifts over its edge, "
                   "and receipts follow, as they do what was measured there")  # fmt: skip
+
+
+def _hidden_grid(grain_s: float) -> Hidden | None:
+    if not grain_s:
+        return None
+    return Hidden(grain_s, f"whether its stamps are cut off to {in_words(grain_s)}: its interval "
+                  "changes, it may measure at such moments, and receipts scatter too far to say "
+                  "which")  # fmt: skip
 
 
 def frame_of(series: Series) -> float:

@@ -37,6 +37,7 @@ _LEAST_PLACES: Final = 6
 _EVENLY: Final = 0.25  # scatter of their distance
 _FULL: Final = 1.03  # of a tick
 _APART: Final = 1.5  # ticks: messages further apart are counted by floors
+_FAR_APART: Final = 3.0  # ticks: rounding counts what is missing
 _WITHIN: Final = 64  # messages that pass until a loss shows
 _HOLE_TICKS: Final = 3.0
 _HOLE: Final = 5.0  # intervals
@@ -45,6 +46,7 @@ _BESIDE: Final = 400  # messages on each side of a hole that tell what is missin
 _SEARCH: Final = 60
 _FINER: Final = 0.1  # of a grain: by how much receipts may be late to tell more than stamps
 _LEAST_WAIT: Final = 0.2  # of an interval
+WHOLE_TICK: Final = 2.5  # ticks: stamps further from a rhythm keep none that a grid hides
 _EVENER: Final = 0.7  # of the scatter of receipts about their stamps
 
 
@@ -68,12 +70,13 @@ class Counted:
 def counted_behind(series: Series, names: Set[FaultName], tick_s: float) -> Counted | None:
     """Messages of coarse stamps counted; by receipts, where these show the rhythm more finely."""
     places = series.places()
+    when = seconds(series.stamp[places] - series.stamp[places[0]])
     if "truncated_stamps" in names and series.receive is not None:
         came = series.receive[places]
         by_receipts = _by_floors(seconds(came - came[0]), _FINER * tick_s)
-        if by_receipts is not None:
+        if by_receipts is not None and float(np.ptp(by_receipts.waits(when))) < WHOLE_TICK * tick_s:
             return replace(by_receipts, tick_s=tick_s)
-    return counted(seconds(series.stamp[places] - series.stamp[places[0]]), tick_s)
+    return counted(when, tick_s)
 
 
 def timed_by_receipts(count: Counted, series: Series) -> Counted:
@@ -117,11 +120,27 @@ def counted(when: Array, tick_s: float) -> Counted | None:
     whole = _but_for_holes(when, tick_s)
     if whole is not None:
         return whole
+    if _mean(when) > _FAR_APART * tick_s:
+        return _by_rounding(when, tick_s)
     if _mean(when) > _APART * tick_s:
         by_floors = _by_floors(when, tick_s)
         full = by_floors is None or float(np.ptp(by_floors.waits(when))) <= _FULL * tick_s
         return by_floors if full else _by_fewest(when, tick_s) or by_floors
     return _by_fewest(when, tick_s)
+
+
+def _by_rounding(when: Array, tick_s: float) -> Counted | None:
+    """Messages so far apart that each interval tells how many are missing in it; None of waits
+    longer than a tick."""
+    apart = when[_LEAST:] - when[:-_LEAST]
+    period = float(np.percentile(apart, _CLEAN)) / _LEAST
+    interval = np.diff(when)
+    for _ in range(_ROUNDS):
+        lost = np.maximum(np.round(interval / period), 1.0) - 1.0
+        found = _with(lost, period, tick_s)
+        period = best_period(when, found.number)
+    found = replace(found, period_s=period)
+    return found if float(np.ptp(found.waits(when))) <= _FULL * tick_s else None
 
 
 def _by_fewest(when: Array, tick_s: float) -> Counted | None:

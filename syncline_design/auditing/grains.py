@@ -11,8 +11,8 @@ from syncline_design.auditing.alternations import FINE, alternates, skips_evenly
 from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
-from syncline_design.auditing.tick_words import Paced, followed
-from syncline_design.auditing.ticks import tick_of
+from syncline_design.auditing.tick_words import Paced, told_by_receipts
+from syncline_design.auditing.ticks import keeps_a_rate, tick_of
 from syncline_design.logs.readers.stream import Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
@@ -80,7 +80,20 @@ def truncated(
         return None
     if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
         return None
-    return None if followed(series, pace.places, grain / NS) else _grain(series, pace, grain)
+    by = told_by_receipts(series, pace.places, grain / NS)
+    return None if by is not None and (by.followed or by.open) else _grain(series, pace, grain)
+
+
+def may_be_cut(series: Series, pace: Cadence) -> float:
+    """The grid [s] that a sensor whose interval changes may keep, or that may cut off its stamps:
+    receipts do not say which; 0 of others."""
+    grain = grain_of(series.stamp[pace.places]) if pace.places.size >= 20 else 0
+    if not grain or not alternates(series, pace, grain):
+        return 0.0
+    if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
+        return 0.0
+    by = told_by_receipts(series, pace.places, grain / NS)
+    return grain / NS if by is not None and by.open else 0.0
 
 
 def cut_to_one_interval(series: Series, pace: Cadence) -> float:
@@ -218,7 +231,9 @@ def _packetised(series: Series, pace: Cadence, stamp: np.ndarray) -> Grain | Non
         return _bunches(series, when, interval, together, pace)
     found = _timer(series, when, interval, pace)
     tick = tick_of(series, pace.places) if found is None else None
-    return found if tick is None else _packets(series, interval, tick, True, 1.0, pace)
+    found = found if tick is None else _packets(series, interval, tick, True, 1.0, pace)
+    own = found is not None and found.size_s != FTDI_S and not keeps_a_rate(interval, found.size_s)
+    return None if own else found
 
 
 def _bunches(

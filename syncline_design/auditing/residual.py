@@ -7,7 +7,11 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.cadence import Cadence, cadence, counted_over_gaps
-from syncline_design.auditing.coarse_rhythm import counted_behind, timed_by_receipts
+from syncline_design.auditing.coarse_rhythm import (
+    WHOLE_TICK,
+    counted_behind,
+    timed_by_receipts,
+)
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.frames import FULL_SPEED_S, TICKS_S
 from syncline_design.auditing.late_scatter import come_at_once, long_waits_of, waits_of
@@ -19,7 +23,6 @@ LATE_OR_COARSE: Final = frozenset({"packetised", "truncated_stamps", "stamped_on
 _FLOOR: Final = 48  # messages, of which the fastest hardly waits
 _SAME: Final = 1e-3  # of a tick
 _CLOCKS: Final = 5e-5  # that a sensor's clock and the host's differ by; crystals: 10 to 50 ppm
-_WHOLE_TICK: Final = 2.5  # ticks: more is no count of what was measured
 
 
 def residual_of(raw: Series, series: Series, faults: tuple[StampFault, ...]) -> ResidualTime:
@@ -64,6 +67,8 @@ def _restored(series: Series, faults: tuple[StampFault, ...]) -> _Restored | Non
     rhythm = _of_coarse(series, when, tick_s, names) if tick_s > 0.0 else None
     if rhythm is None:
         rhythm = _rhythm(when, cadence(series), tick_s)
+        if "packetised" not in names and rhythm is not None and tick_s > 0.0:  # cut off, no later
+            rhythm = rhythm if float(np.ptp(when - rhythm)) < WHOLE_TICK * tick_s else None
     if rhythm is not None:
         held_s = _timer_of(tick_s) if "packetised" in names else _frame_of(faults)
         unseen_s = _unseen(when - rhythm, when, held_s)
@@ -110,7 +115,7 @@ def _of_coarse(series: Series, when: Array, tick_s: float, names: set[FaultName]
     if "packetised" in names:
         count = timed_by_receipts(count, series)
     waits = count.waits(when)
-    return np.asarray(when - waits) if float(np.ptp(waits)) < _WHOLE_TICK * tick_s else None
+    return np.asarray(when - waits) if float(np.ptp(waits)) < WHOLE_TICK * tick_s else None
 
 
 def _rhythm(when: Array, pace: Cadence, tick_s: float) -> Array | None:

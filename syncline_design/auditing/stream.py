@@ -129,6 +129,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     even, turning_s = grains.without_turns(slips.series, cadence(slips.series))
     slips = replace(slips, series=slips.series if grain else even)
     known_s = grain.size_s if grain is not None else arrival.frame_of(slips.series)
+    known_s = known_s or grains.may_be_cut(slips.series, cadence(slips.series))
     least = max(_coarse(raw), step_ns / NS, known_s, turning_s)
     moved = _but_for_turns(without_shifts(slips.series, least_s=least), found, told)
     if grain is not None and not any(f.fault == "drift" for f in moved.faults):

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.auditing.coarse_rhythm import counted, evener
+from syncline_design.auditing.local_rhythm import off_course
 from syncline_design.auditing.series import Array, Series, in_words, seconds
 from syncline_design.auditing.ticks import near_a_line
 from syncline_design.machine.quick_dataclass import dataclass
@@ -34,6 +35,8 @@ _REACH: Final = 1.03  # ticks
 _PERIODS: Final = 24  # messages of which a count, or a rate that is a simple part, repeats itself
 _TURNED: Final = 0.5  # places of a period: a repeated pattern that moves by two is none
 _ALIKE: Final = 0.97  # of the distances between what is left out: a strict count
+_LAGS: Final = (1, 2, 4, 8, 16, 32, 64)  # messages
+_SUMS: Final = 12
 _CLOCKS: Final = 5e-5  # that a sensor's clock and the timer's differ by
 
 
@@ -93,27 +96,61 @@ def paced(series: Series, places: NDArray[np.intp]) -> Paced | None:
     return Paced(tick, count.period_s, places, waits, repeats, evener(late + waits, late))
 
 
-def followed(series: Series, places: NDArray[np.intp], grain_s: float) -> bool:
+@dataclass(frozen=True, slots=True)
+class Told:
     """Whether messages come after their stamps on a grid as if they had been measured there.
 
-    Of a rhythm a + k T, w = s - a - k T and delays d: cut-off stamps leave r - s = d - w, those of
+    sigma: in units of chance, positive of what was measured (or taken) there, negative of stamps
+    that the grid cut off.  even: by the one rhythm of an even sensor.
+    """
+
+    sigma: float
+    even: bool
+
+    @property
+    def followed(self) -> bool:
+        return self.sigma > _SIGMA
+
+    @property
+    def open(self) -> bool:
+        """Whether neither is sure, of a sensor whose interval changes: it may keep the grid."""
+        return not self.even and abs(self.sigma) <= _SIGMA
+
+
+def told_by_receipts(series: Series, places: NDArray[np.intp], grain_s: float) -> Told | None:
+    """Of a smooth course c, w = s - c and delays d: cut-off stamps leave r - s = d - w, those of
     messages that were measured or taken at s leave d.  So r - s changes from message to message by
     what delays do less what w does, or by the first alone: the likelihoods of both, of delays whose
     changes are Laplace's (sums of absolute values), apart by more than chance makes them.
+
+    The course is a + k T, or that of the messages around.  None without one.
     """
-    if series.receive is None:
-        return False
+    if series.receive is None or places.size < 2:
+        return None
     when = seconds(series.stamp[places] - series.stamp[places[0]])
+    late = seconds((series.receive - series.stamp)[places])
     count = counted(when, grain_s)
-    if count is None:
-        return False
-    waits = count.waits(when)
-    if float(np.ptp(waits)) > _REACH * grain_s:
-        return False
-    moved, late = np.diff(waits), np.diff(seconds((series.receive - series.stamp)[places]))
-    nearer = np.abs(late + moved) - np.abs(late)  # to what was measured there, positive
-    chance = float(np.std(nearer)) * float(np.sqrt(nearer.size))
-    return float(nearer.sum()) > _SIGMA * chance > 0.0
+    waits = None if count is None else count.waits(when)
+    even = waits is not None and float(np.ptp(waits)) <= _REACH * grain_s
+    pieces = (waits, late) if waits is not None and even else off_course(when, late, grain_s)
+    if pieces is None:
+        return None
+    return Told(_nearer(*(np.atleast_2d(piece) for piece in pieces)), even)
+
+
+def _nearer(off: Array, late: Array) -> float:
+    """How much nearer [sigma] receipts are to what was measured there than to what was cut off, by
+    messages as far apart as stamps show most; off, late: rows of messages one after another [s].
+
+    Chance is that of sums over a twelfth of the messages each, as delays remember others.
+    """
+    lags = [lag for lag in _LAGS if 2 * lag <= off.shape[1]]
+    apart = max(lags, key=lambda lag: float(np.mean(np.abs(off[:, lag:] - off[:, :-lag]))))
+    moved, later = (rows[:, apart:] - rows[:, :-apart] for rows in (off, late))
+    nearer = np.abs(later + moved) - np.abs(later)
+    sums = np.asarray([float(part.sum()) for part in np.array_split(nearer.ravel(), _SUMS)])
+    chance = float(np.std(sums, ddof=1)) * float(np.sqrt(_SUMS))
+    return float(sums.sum()) / chance if chance > 0.0 else 0.0
 
 
 def _tick_of(passed: Array) -> float | None:

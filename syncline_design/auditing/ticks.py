@@ -29,6 +29,8 @@ _TIGHT: Final = 0.2  # of a tick: scatter of receipts about stamps
 _PHASE: Final = 0.003  # of a tick: how near to ticks stamps that come in turn are on average
 _SIGMA: Final = 4.0  # of the uncertainty of a median
 _TURNS: Final = (2, 3, 4)
+_STRETCH, _LEAST = 24, 4  # messages, and stretches of them
+_SAME: Final = 0.1  # of a tick; rounding alone leaves 0.02
 
 
 def tick_of(series: Series, places: NDArray[np.intp]) -> float | None:
@@ -73,6 +75,18 @@ def near_a_line(counts: Array, window: int = _WINDOW) -> tuple[Mask, Array]:
     slope = windows @ k / float(k @ k)
     left = windows - windows.mean(axis=1, keepdims=True) - np.outer(slope, k)
     return np.std(left, axis=1) < _BALANCED, slope
+
+
+def keeps_a_rate(passed: Array, tick: float) -> bool:
+    """Whether stretches between losses have one interval: a sensor that pings as fast as the depth
+    lets it may do so at ticks of its own, and then no timer made it wait.
+
+    passed: between neighbours [s].
+    """
+    near, slope = near_a_line(np.round(passed / tick), _STRETCH)
+    if int(near.sum()) < _LEAST:
+        return True
+    return float(np.subtract(*np.percentile(slope[near], [98.0, 2.0]))) < _SAME
 
 
 def _on_average(when: Array, counts: Array, tick: float, noise: float) -> bool:
