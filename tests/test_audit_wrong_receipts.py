@@ -130,3 +130,33 @@ def test_zeros_and_wrong_stamps_among_messages_in_another_order_are_no_wrong_rec
     row = said(tmp_path, stamp[order], receive[order])
     assert "wrong_receipts" not in found(row)
     assert "unset_stamps" in found(row)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("rate", [10.0, 50.0, 200.0])
+@pytest.mark.parametrize(("off", "many"), [(5.0, 1), (-5.0, 1), (-0.8, 1), (60.0, 5), (2.4, 3)])
+def test_wrong_receipts_are_named_in_a_file_that_is_sorted_by_them(
+    tmp_path: Path, off: float, many: int, rate: float, seed: int
+) -> None:
+    t, receive = sensor(seed, rate, 80.0)
+    first = int(t.size * 0.48)
+    spoilt = receive.copy()
+    spoilt[first : first + many] += off
+    order = np.argsort(spoilt, kind="stable")
+    row = said(tmp_path, t[order], spoilt[order])
+    assert set(found(row)) == {"wrong_receipts"}
+    fault = found(row)["wrong_receipts"]
+    assert fault.parameters["count"] == many
+    assert fault.parameters["seconds"] == pytest.approx(off, abs=float(np.ptp(receive - t)))
+    assert row.residual_s.bound == pytest.approx(np.ptp(receive - t), rel=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_wrong_stamp_beside_a_lost_message_is_no_wrong_receipt(tmp_path: Path, seed: int) -> None:
+    """Five seconds and a half interval back: no hole is as long as it needs."""
+    t, receive = sensor(seed, 50.0, 80.0)
+    stamp = t.copy()
+    stamp[2100] -= 5.01
+    there = np.arange(t.size) != 1850
+    row = said(tmp_path, stamp[there], receive[there])
+    assert "wrong_receipts" not in found(row)

@@ -41,7 +41,7 @@ _LONG_GAP: Final = 50.0  # intervals
 _REPEATED: Final = 2.5  # intervals: a message that repeats an older stamp than its last but one
 _COVERED: Final = 0.5  # of the time that passed
 _ALONE, _MOST_ALONE = 0.6, 0.6  # of an interval; of the messages far behind
-_DEEPEST_NS: Final = 2 * 10**9  # a stamp further back was not overtaken
+DEEPEST_NS: Final = 2 * 10**9  # a stamp further back was not overtaken
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +84,7 @@ def sequence_of(series: Series) -> Sequence | None:
             break
         right &= ~odd
     behind = np.maximum.accumulate(np.where(right, key, key.min())) - key
-    right &= (behind <= _DEEPEST_NS) & ~_displaced(key, away, right, behind)
+    right &= (behind <= DEEPEST_NS) & ~_displaced(key, away, right, behind)
     period = _kept(key[right]) if float(np.mean(right)) > 1.0 - _MOST_ODD else None
     if period is None:
         return None

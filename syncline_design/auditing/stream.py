@@ -37,6 +37,7 @@ from syncline_design.auditing.result import (
 from syncline_design.auditing.series import NS, Series, seconds, series_of
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts
 from syncline_design.auditing.slips import without_slips
+from syncline_design.auditing.sorted_receipts import put_where_measured
 from syncline_design.auditing.stream_epochs import (
     as_declared,
     as_epochs,
@@ -99,7 +100,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     stamps = stream.stamps
     assert stamps is not None
     found: list[StampFault] = []
-    recorded = series_of(stamps.primary_ns, _receipts(stamps), start)
+    recorded = put_where_measured(series_of(stamps.primary_ns, _receipts(stamps), start))
     recorded = _take(without_wild_times(recorded), found)
     raw = in_order_of_receipt(_with_wild_ones(without_wrong_receipts(recorded), found))
     series, unit, step_ns = _in_one_unit(raw, found, stamps.primary_factor)

@@ -71,7 +71,7 @@ def _wrong(receive: Nanoseconds, late: Nanoseconds) -> NDArray[np.bool_]:
     stamp = receive - late
     usual = MOST_AT_END * np.median(np.abs(np.diff(stamp)))
     out = np.ones(receive.size, bool)
-    out[_rising(receive)] = False
+    out[rising(receive)] = False
     wrong = np.zeros(receive.size, bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], out.astype(np.int8), [0]])))
     for begin, end in edges.reshape(-1, 2):
@@ -96,7 +96,7 @@ def _set_between(before: Nanoseconds, after: Nanoseconds) -> bool:
     return abs(float(np.median(after) - np.median(before))) > FAR_NS / 2
 
 
-def _rising(values: Nanoseconds) -> list[int]:
+def rising(values: Nanoseconds) -> list[int]:
     """Places of the longest subsequence that never falls."""
     tops: list[int] = []
     ends: list[int] = []
