@@ -91,3 +91,14 @@ def test_losses_beside_a_coarse_grid_leave_its_bound_as_it_is(seed: int) -> None
     one = of(np.floor(at / 0.02) * 0.02, receive)
     assert names(one) == ["truncated_stamps", "lost_messages"]
     assert one.residual.bound == pytest.approx(float(np.ptp(receive - at)), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("rate_hz", [70.0, 130.0])
+def test_a_step_hides_no_grid(rate_hz: float, seed: int) -> None:
+    """An even sensor stays one where its clock jumps."""
+    rng = np.random.default_rng([233, seed])
+    at = 0.003 + np.arange(0.0, 70.0, 1.0 / rate_hz) * (1.0 + 2e-5)
+    receive = received(rng, at, 1e-3)
+    one = of(np.floor(at / 0.001) * 0.001 - 0.4 * (at > 31.0), receive)
+    assert sorted(names(one)) == ["step", "truncated_stamps"]

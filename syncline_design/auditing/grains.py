@@ -12,7 +12,7 @@ from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
 from syncline_design.auditing.tick_words import Paced, told_by_receipts
-from syncline_design.auditing.ticks import keeps_a_rate, tick_of
+from syncline_design.auditing.ticks import ONE_RATE, rates_apart, tick_of
 from syncline_design.logs.readers.stream import Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
@@ -232,8 +232,9 @@ def _packetised(series: Series, pace: Cadence, stamp: np.ndarray) -> Grain | Non
     found = _timer(series, when, interval, pace)
     tick = tick_of(series, pace.places) if found is None else None
     found = found if tick is None else _packets(series, interval, tick, True, 1.0, pace)
-    own = found is not None and found.size_s != FTDI_S and not keeps_a_rate(interval, found.size_s)
-    return None if own else found
+    if found is None or found.size_s == FTDI_S:
+        return found
+    return None if rates_apart(interval, found.size_s) > ONE_RATE else found  # pings as it likes
 
 
 def _bunches(

@@ -327,13 +327,14 @@ def _slope(times: Array, level: Array) -> float:
 
 
 def _paired(found: list[Jump], jitter_s: float) -> list[Jump]:
-    """A jump and the one after it that takes it back, as one episode."""
+    """A jump and one after it that takes it back, as one episode: whatever jumped in between."""
     out: list[Jump] = []
     for jump in found:
-        last = out[-1] if out else None
         near = max(_JITTER * jitter_s, _EQUAL * abs(jump.size_s), 1e-6)
-        if last is not None and last.end is None and abs(last.size_s + jump.size_s) < near:
-            out[-1] = replace(last, end=jump.place)
+        taken = [k for k, one in enumerate(out)
+                 if one.end is None and abs(one.size_s + jump.size_s) < near]  # fmt: skip
+        if taken:
+            out[taken[-1]] = replace(out[taken[-1]], end=jump.place)
         else:
             out.append(jump)
     return out

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.coarse_rhythm import counted, evener
 from syncline_design.auditing.local_rhythm import off_course
 from syncline_design.auditing.series import Array, Series, in_words, seconds
-from syncline_design.auditing.ticks import near_a_line
+from syncline_design.auditing.ticks import ONE_RATE, near_a_line, rates_apart
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
 
@@ -101,7 +101,7 @@ class Told:
     """Whether messages come after their stamps on a grid as if they had been measured there.
 
     sigma: in units of chance, positive of what was measured (or taken) there, negative of stamps
-    that the grid cut off.  even: by the one rhythm of an even sensor.
+    that the grid cut off.  even: of a sensor of one interval.
     """
 
     sigma: float
@@ -135,6 +135,7 @@ def told_by_receipts(series: Series, places: NDArray[np.intp], grain_s: float) -
     pieces = (waits, late) if waits is not None and even else off_course(when, late, grain_s)
     if pieces is None:
         return None
+    even = even or rates_apart(np.diff(when), grain_s) < ONE_RATE
     return Told(_nearer(*(np.atleast_2d(piece) for piece in pieces)), even)
 
 

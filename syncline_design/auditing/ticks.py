@@ -30,7 +30,8 @@ _PHASE: Final = 0.003  # of a tick: how near to ticks stamps that come in turn a
 _SIGMA: Final = 4.0  # of the uncertainty of a median
 _TURNS: Final = (2, 3, 4)
 _STRETCH, _LEAST = 24, 4  # messages, and stretches of them
-_SAME: Final = 0.1  # of a tick; rounding alone leaves 0.02
+_AS_USUAL: Final = 0.6  # of an interval: one that is usual
+ONE_RATE: Final = 0.1  # of a tick; a tick more or less leaves 0.08
 
 
 def tick_of(series: Series, places: NDArray[np.intp]) -> float | None:
@@ -77,16 +78,17 @@ def near_a_line(counts: Array, window: int = _WINDOW) -> tuple[Mask, Array]:
     return np.std(left, axis=1) < _BALANCED, slope
 
 
-def keeps_a_rate(passed: Array, tick: float) -> bool:
-    """Whether stretches between losses have one interval: a sensor that pings as fast as the depth
-    lets it may do so at ticks of its own, and then no timer made it wait.
+def rates_apart(passed: Array, tick: float) -> float:
+    """By how many ticks the mean interval of stretches without losses differs; nan without such.
 
-    passed: between neighbours [s].
+    A sensor that pings as fast as the depth lets it has many; passed: between neighbours [s].
     """
-    near, slope = near_a_line(np.round(passed / tick), _STRETCH)
-    if int(near.sum()) < _LEAST:
-        return True
-    return float(np.subtract(*np.percentile(slope[near], [98.0, 2.0]))) < _SAME
+    usual = float(np.median(passed))
+    rows = passed[: passed.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
+    rows = rows[np.all(np.abs(rows - usual) < _AS_USUAL * usual, axis=1)]
+    if rows.shape[0] < _LEAST:
+        return float("nan")
+    return float(np.subtract(*np.percentile(rows.mean(axis=1) / tick, [95.0, 5.0])))
 
 
 def _on_average(when: Array, counts: Array, tick: float, noise: float) -> bool:
