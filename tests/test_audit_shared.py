@@ -94,13 +94,13 @@ def test_a_recorder_that_is_set_near_an_end_is_named(
     assert "recorder_clock" in rows["odom"]
 
 
-def in_parts(folder: Path, cut: float, apart: float = 0.0) -> list[Path]:
-    """An IMU, set back by 50 ms where the file was split, with 3 s of it missing a second later,
-    and a GNSS, in two folders, the second as of a run that much later."""
+def in_parts(folder: Path, cut: float, apart: float = 0.0, hole: float = 1.0) -> list[Path]:
+    """An IMU, set back by 50 ms where the file was split, with 3 s of it missing a second later (or
+    `hole`), and a GNSS, in two folders, the second as of a run that much later."""
     paths = []
     for seed, (name, rate) in enumerate((("imu", 100.0), ("gnss", 10.0))):
         t = even(rate, 60.0)
-        t = t[(t < cut + 1.0) | (t > cut + 4.0)] if name == "imu" else t
+        t = t[(t < cut + hole) | (t > cut + hole + 3.0)] if name == "imu" else t
         got = transported(t, 1e-3, seed)
         stamp = t - 0.05 * (got >= cut) * (name == "imu")
         for part, inside in (("a", got < cut), ("b", got >= cut)):
@@ -117,6 +117,19 @@ def test_what_goes_wrong_where_a_file_was_split_is_seen(tmp_path: Path) -> None:
     assert [row.messages for row in found.streams if row.name == "gnss"] == [600]
     assert len(found.evidence) == 4
     assert all("parts of one recording" in " ".join(row.notes) for row in found.streams)
+
+
+@pytest.mark.parametrize("hole", [-3.5, -3.0, -1.5, 0.0])
+def test_a_stream_that_is_missing_where_a_file_was_split_is_one(
+    tmp_path: Path, hole: float
+) -> None:
+    """Up to it, from it on, or about it: the others go on, as in a bag."""
+    found = audit(in_parts(tmp_path, 30.0, hole=hole))
+    rows = {row.name: row for row in found.streams}
+    assert set(names(rows["imu"])) == {"step", "gap"}
+    assert names(rows["gnss"]) == []
+    (gap,) = (fault for fault in rows["imu"].faults if fault.fault == "gap")
+    assert gap.parameters["interval_s"] == pytest.approx(3.0, abs=0.1)
 
 
 def test_two_runs_are_two_recordings(tmp_path: Path) -> None:

@@ -42,18 +42,53 @@ class _Span:
 
 
 _Timed = tuple[FileStreams, _Span | None]
+_Folder = tuple[FileStreams, ...]  # the tables of one folder, or one file of another kind
 
 
 def recordings(opened: Sequence[FileStreams]) -> list[list[FileStreams]]:
     """Files of one recorder: every CSV file is one stream of it, parts of a recording are one."""
-    whole = _with_parts_joined(opened)
+    whole = _with_parts_joined(_with_folders_joined(opened))
     tables = [one for one in whole if one.format.startswith(_CSV)]
     others = [one for one in whole if not one.format.startswith(_CSV)]
     return ([tables] if tables else []) + [[one] for one in others]
 
 
+def _with_folders_joined(opened: Sequence[FileStreams]) -> list[FileStreams]:
+    """Folders of tables that are parts of one recording, as bags of several streams are: one of
+    their streams may miss what lies about the border."""
+    folders: dict[Path, list[FileStreams]] = {}
+    for one in opened:
+        if one.format.startswith(_CSV):
+            folders.setdefault(one.path.parent, []).append(one)
+    timed = [(_as_one(folder), tuple(folder)) for folder in folders.values()]
+    joined = [one for one in opened if not one.format.startswith(_CSV)]
+    for chain in _chains([(one, _span(one)) for one, _ in timed]):
+        bundles = [next(files for own, files in timed if own is part) for part, _ in chain]
+        joined += _by_name(bundles)
+    return joined
+
+
+def _as_one(folder: Sequence[FileStreams]) -> FileStreams:
+    streams = tuple(stream for one in folder for stream in one.streams)
+    return FileStreams(folder[0].path, folder[0].format, streams, None)
+
+
+def _by_name(bundles: Sequence[_Folder]) -> list[FileStreams]:
+    found: dict[tuple[str, int], list[FileStreams]] = {}
+    for bundle in bundles:
+        names = [one.path.name for one in bundle]  # a file that is given twice is two
+        for k, one in enumerate(bundle):
+            found.setdefault((names[k], names[:k].count(names[k])), []).append(one)
+    return [_one_recording(parts) for parts in found.values()]
+
+
 def _with_parts_joined(opened: Sequence[FileStreams]) -> list[FileStreams]:
-    timed = [(one, _span(one)) for one in opened]
+    chains = _chains([(one, _span(one)) for one in opened])
+    return [_one_recording([part for part, _ in chain]) for chain in chains]
+
+
+def _chains(timed: Sequence[_Timed]) -> list[list[_Timed]]:
+    """What begins when another one ends, after it."""
     chains: list[list[_Timed]] = []
     for one in sorted(timed, key=lambda one: 0.0 if one[1] is None else one[1].first_s):
         before = next((chain for chain in chains if _adjoin(chain[-1], one)), None)
@@ -61,7 +96,7 @@ def _with_parts_joined(opened: Sequence[FileStreams]) -> list[FileStreams]:
             chains.append([one])
         else:
             before.append(one)
-    return [_one_recording([part for part, _ in chain]) for chain in chains]
+    return chains
 
 
 def _adjoin(one: _Timed, other: _Timed) -> bool:
