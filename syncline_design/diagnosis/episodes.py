@@ -12,6 +12,7 @@ to come and go from row to row: a missing effect that shows while the vehicle mo
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,8 @@ import numpy as np
 from syncline_design.diagnosis.fitting import Data, Model, data_of
 from syncline_design.diagnosis.motion_scatter import lasting
 from syncline_design.diagnosis.noise import SensorKey, as_specified, white_covariance
+from syncline_design.diagnosis.steady import goes_on
+from syncline_design.diagnosis.unlike_readings import slopes_of_readings
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
@@ -36,7 +39,6 @@ LEAST_GROWN = 1.3  # standard deviations over the usual ones
 SIZES = np.geomspace(1.05, 300.0, 90)
 NATS = 15.0
 MEDIAN_SQUARE = 0.4549364231195724  # of the standard normal
-STEADY = 0.5  # correlation of one row with the next above which it is no noise
 MOST_EPISODES = 3
 ROUNDS = 4
 LEAST_ROWS = 200  # of a log that is searched
@@ -92,6 +94,7 @@ def episodes(data: Data, model: Model, rng: np.random.Generator) -> tuple[Episod
         return ()
     axes = list(data.axes)
     left = (model.error - lasting(data, model))[:, axes]
+    readings = [own[:, axes] for own in slopes_of_readings(data).values()]
     found: tuple[Episode, ...] = ()
     structure = data.structure
     while len(found) < MOST_EPISODES:
@@ -100,7 +103,7 @@ def episodes(data: Data, model: Model, rng: np.random.Generator) -> tuple[Episod
         parts = [
             (w.sensor, w.grown(level).covariance[:, axes][:, :, axes]) for w in structure.white
         ]
-        tried = [one for p in parts if (one := _in_sensor(data, left, white, p, rng))]
+        tried = [one for p in parts if (one := _in_sensor(data, left, white, p, readings, rng))]
         if not tried:
             break
         found = (*found, max(tried, key=lambda one: one.gain))
@@ -113,9 +116,11 @@ def _in_sensor(
     left: Array,
     white: Array,
     part: tuple[SensorKey, Array],
+    readings: Sequence[Array],
     rng: np.random.Generator,
 ) -> Episode | None:
-    """The stretch in which one sensor's noise is larger, if there is one."""
+    """The stretch in which one sensor's noise is larger, if there is one; readings (n, a, c): what
+    those of every sensor do."""
     sensor, own = part
     inverse = np.linalg.inv(white)
     weighted = np.einsum("nij,nj->ni", inverse, left)
@@ -141,9 +146,9 @@ def _in_sensor(
     gain = float(np.sum(inside.saved(factor)))
     if factor < LEAST_GROWN or gain < NATS + 2.0 * math.log(BLOCKS):
         return None
-    if _steady(alone[first:last]):
+    time_s, rows = data.structure.time_s, slice(first, last)
+    if goes_on(time_s[rows], left[rows], [own[rows] for own in readings]):
         return None
-    time_s = data.structure.time_s
     spread = _spread(inside, factor)
     return Episode(sensor, float(time_s[first]), float(time_s[last - 1]), factor, spread, gain)
 
@@ -247,13 +252,6 @@ def _best_run(saved: Array) -> tuple[int, int]:
     least = np.minimum.accumulate(total)
     last = int(np.argmax(total[1:] - least[:-1])) + 1
     return int(np.argmin(total[:last])), last
-
-
-def _steady(white: Array) -> bool:
-    """Whether what is left goes on from row to row (n, a)."""
-    if len(white) < 3:
-        return True
-    return bool(np.sum(white[1:] * white[:-1]) > STEADY * np.sum(white**2))
 
 
 def _spread(noise: _Shares, factor: float) -> float:

@@ -17,6 +17,7 @@ from syncline_design.diagnosis.fitting import Data, Model, data_of
 from syncline_design.diagnosis.loud_readings import LoudSensor, loud_readings
 from syncline_design.diagnosis.motion_scatter import lasting
 from syncline_design.diagnosis.noise import SensorKey
+from syncline_design.diagnosis.steady import goes_on
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
@@ -26,7 +27,6 @@ READINGS = {
     "attitude": ("roll", "pitch", "yaw"),
     "ranging": ("range", "azimuth", "elevation"),
 }
-STEADY = 0.5  # correlation of one row with the next above which it is no white noise
 LEAST_ROWS = 200  # of a log that is searched
 
 
@@ -89,19 +89,11 @@ def unlike_readings(data: Data, model: Model) -> tuple[Unlike, ...]:
     on_axes = {sensor: own[:, axes] for sensor, own in slopes.items()}
     motions = [one.direction[:, axes] for one in data.structure.directed]
     loud = loud_readings(left, on_axes, fixed[:, axes][:, :, axes], motions)
-    return tuple(
-        _unlike(one) for one in loud if not _is_steady(left, on_axes[one.sensor], one.times)
-    )
+    if not loud or goes_on(data.structure.time_s, left, on_axes.values()):
+        return ()
+    return tuple(_unlike(one) for one in loud)
 
 
 def _unlike(one: LoudSensor) -> Unlike:
     least = min(1.0, *one.times)
     return Unlike(one.sensor, tuple(own / least for own in one.times), one.spread, one.gain)
-
-
-def _is_steady(left: Array, slopes: Array, times: tuple[float, ...]) -> bool:
-    """Whether what the loud reading leaves goes on from row to row: it is no white noise then."""
-    along = slopes[:, :, int(np.argmax(times))]
-    size = np.sum(along**2, axis=1)
-    part = np.sum(along * left, axis=1) / np.maximum(size, np.finfo(float).tiny)
-    return bool(np.sum(part[1:] * part[:-1]) > STEADY * np.sum(part**2))
