@@ -13,7 +13,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
-from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
+from syncline_design.report.palette import BAD, GRID, INK, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.study_words import short_key
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
@@ -81,7 +81,7 @@ def _cell(
     x, y = place
     corner = (x - 0.5, y - 0.5)
     if cost is None:
-        axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=MUTED, linewidth=0.6))
+        axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=GRID, linewidth=0.6))
         axes.text(x, y, "\u2715", ha="center", va="center", color=BAD)
         return
     axes.add_patch(

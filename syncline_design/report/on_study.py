@@ -99,14 +99,12 @@ def _heat(summary: StudySummary) -> list[Node]:
         "A cross: computed, and no case is known to meet."
     )
     short = show(shown, silent=True, reach="text")
+    whole = show(shown, silent=True, reach="page")
     if len(shown.rows) > MOST_DOWN:
         size = f"{len(heat.x_values)} by {len(heat.y_values)} values"
         short = [Text(f"Over {size}: see the page or the CSV table.", reach="text")]
-    return [
-        Chart("heat", lambda: charts_study.cost_map(heat), caption),
-        *show(shown, silent=True, reach="page"),
-        *short,
-    ]
+        whole = [Group(tuple(whole), "fold", summary=f"As a table, {size}", reach="page")]
+    return [Chart("heat", lambda: charts_study.cost_map(heat), caption), *whole, *short]
 
 
 def _sampled(summary: StudySummary) -> list[Node]:

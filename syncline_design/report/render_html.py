@@ -28,6 +28,7 @@ MOST_VALUES: Final = 200  # rows of the table below a figure; of more both ends
 _LINE: Final = 30  # characters of a column that holds sentences
 _TABLET: Final = 92  # characters in a line of a table there
 _PHONE: Final = 48
+_SHORT_KEY: Final = 16  # letters: it stays in one line
 _FEW: Final = 16  # lines of a table that is shown whole below its figure
 _BOX: Final = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 _NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
@@ -203,7 +204,9 @@ def _soft(text: str) -> str:
 
 
 def _breakable(text: str) -> Any:
-    """A key path that may go on in the next line before each of its dots."""
+    """A long key path, which may go on in the next line before each of its dots."""
     from markupsafe import Markup
 
+    if len(text) <= _SHORT_KEY:
+        return _whole(text)
     return Markup("<wbr>").join(_whole(part) for part in _DOT.split(visible(text)))
