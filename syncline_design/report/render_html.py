@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _TEMPLATES: Final = "syncline_design.templates"
 MOST_VALUES: Final = 200  # rows of the table below a figure; of more both ends
 _LINE: Final = 30  # characters of a column that holds sentences
-_TABLET: Final = 92  # characters in a line of a table there
+_TABLET: Final = 100  # characters in a line of a table there
 _PHONE: Final = 48
 _SHORT_KEY: Final = 16  # letters: it stays in one line
 _FEW: Final = 16  # lines of a table that is shown whole below its figure
