@@ -11,7 +11,9 @@ from typing import Any
 
 import pytest
 
+import page_looks
 import syncline_design as sd
+from browsing import Opened
 from syncline_design.report import notebook
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -75,6 +77,29 @@ def test_a_verdict_is_drawn_without_a_script_and_with_every_figure() -> None:
     assert "0.4474 m" in drawn.text
     assert drawn.tags >= {"table", "details", "svg"}
     assert not drawn.tags & {"script", "iframe", "link", "html", "body", "form"}
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize(("ground", "ink"), [("#111111", "#ffffff"), ("#ffffff", "#111111")])
+def test_a_cell_is_read_in_the_notebooks_own_theme(
+    browser: Any, tmp_path: Path, ground: str, ink: str
+) -> None:
+    """As JupyterLab has it: its tables in its own ink, which only it knows; axe on contrasts."""
+    verdict = sd.check(ROOT / "specs" / "usv_wire_missing.yaml", monte_carlo=False)
+    path = tmp_path / "cell.html"
+    css = (
+        f"body {{ background: {ground}; color: {ink} }} .jp table {{ color: {ink} }}"
+        ".jp { font: 13px sans-serif }"
+    )
+    drawn = f"<style>{css}</style><div class='jp'>{verdict._repr_html_()}</div>"
+    path.write_text(f"<!DOCTYPE html><html lang='en'><title>x</title>{drawn}</html>", "utf-8")
+    with Opened(browser, path) as opened:
+        unfold = "() => document.querySelectorAll('details').forEach(d => { d.open = true; })"
+        opened.page.evaluate(unfold)
+        opened.page.evaluate(page_looks.AXE.read_text("utf-8") + "; undefined")
+        found = opened.page.evaluate(page_looks.BARRIERS, page_looks.COLOURS)
+        assert found["passes"] > 0
+        assert found["violations"] == []
 
 
 def test_what_a_user_wrote_stays_text(tmp_path: Path) -> None:

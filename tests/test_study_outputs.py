@@ -6,12 +6,15 @@ import csv
 import html
 import io
 import json
+import re
+from datetime import date
 from pathlib import Path
 from xml.etree import ElementTree
 
 import jsonschema
 import pytest
 
+from html_page import Page
 from report_samples import HOSTILE
 from study_specs import SPEC, STUDY, write
 from syncline_design.machine.records import read_as, schema_of
@@ -27,6 +30,13 @@ from syncline_design.studies.record import SCHEMA as CASE_SCHEMA
 from syncline_design.studies.record import CaseRecord
 
 LINE_OF_ACC = 4
+STAMPED = "primitive: pps, timestamping: gpio"
+PINNED = (  # every case has the payload of 33 362 EUR
+    SPEC.replace("candidates: [ublox_f9p_rtk, ublox_f9p_pvt]", f"sensor: ublox_f9p_rtk, {STAMPED}")
+    .replace("candidates: [sbg_apogee, sbg_ellipse]", f"sensor: sbg_ellipse, {STAMPED}")
+    .replace("candidates: [velodyne_hdl32e, riegl_vux1uav]", f"sensor: velodyne_hdl32e, {STAMPED}")
+    .replace("timestamping: {candidates: [hardware, gpio]}", "")
+)
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +73,49 @@ def test_allowed_misses_are_skipped_tests(tmp_path: Path) -> None:
     assert root.get("failures") == "0"
     assert int(root.get("skipped", "0")) == len(done) - done.counts["meets"] > 0
     assert "::error" not in text_of("github", done)
+
+
+WAIVED = """\
+  - id: COST-1
+    kind: cost
+    limit: 30000 EUR
+    waiver: {reason: next budget, expires: 2027-03-31}
+"""
+
+
+@pytest.mark.parametrize(("today", "over"), [(date(2026, 11, 30), False), (date(2027, 4, 1), True)])
+def test_waivers_and_what_fails_are_said_wherever_cases_are(
+    tmp_path: Path, today: date, over: bool
+) -> None:
+    """A payload of 33 362 EUR against 30 000 EUR: waived, then no more."""
+    spec = re.sub(r"  - \{id: COST-1.*\n", WAIVED, PINNED)
+    done = run_study(write(tmp_path, STUDY, spec), StudySettings(workers=1, today=today))
+    failing = [case.number for case in done.cases() if case.verdict != "meets"]
+    rows = list(csv.DictReader(io.StringIO(text_of("csv", done))))
+    shown = console(on_study(done), colour=False)
+    page = Page(str(render_study("html", done))).text
+    told = json.loads(text_of("sarif", done))["runs"][0]["results"]
+    kept = [one for one in told if "suppressions" in one]
+    assert all("COST-1" in row["failing"] for row in rows)
+    assert {row["waived"] for row in rows if row["verdict"] == "meets"} == (
+        set() if over else {"COST-1"})  # fmt: skip
+    for text in (shown, page):
+        assert ("waiver of COST-1 expired" in text) == over
+        assert ("waiver expired on 2027-03-31: next budget" in " ".join(text.split())) == over
+        assert ("waived until 2027-03-31: next budget" in " ".join(text.split())) != over
+        assert f"{len(rows)} of {len(rows)}" in text.replace("\u00a0", " ")
+    assert len(failing) == (len(rows) if over else sum("ACC-1" in row["failing"] for row in rows))
+    assert (len(kept), [one["ruleId"] for one in kept]) == ((0, []) if over else (1, ["cost"]))
+
+
+def test_several_bases_are_told_apart_where_their_least_is_shown(tmp_path: Path) -> None:
+    (tmp_path / "dear.yaml").write_text(
+        PINNED.replace("100000 EUR", "30000 EUR").replace("Small UAV", "Dear"), "utf-8"
+    )
+    study = write(tmp_path, STUDY.replace("[spec.yaml]", "[spec.yaml, dear.yaml]"), PINNED)
+    shown = " ".join(console(on_study(run_study(study)), colour=False).split())
+    assert "Of several bases the one that costs least is shown." in shown
+    assert "Dear (none of 6 meets)" in shown
 
 
 def test_sarif_points_at_the_requirement_once(result: StudyResult) -> None:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from browsing import flaws_of
 from html_page import Page
-from syncline_design.campaign.watch_result import e_value_text
+from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_text
 from syncline_design.model.figure_text import format_estimate, format_interval
+from syncline_design.report.charts_watch import courses
 from watched_series import (
     BOUND,
     LABELS,
@@ -84,6 +87,18 @@ def test_courses_have_the_digits_of_their_uncertainty(spec: Path, tmp_path: Path
     page = Page((tmp_path / "watch.html").read_text("utf-8"))
     text = page.text.replace("\u00a0", " ").replace("\u2212", "-")
     assert all(f"{1e3 * v['value']:.2f} ms" in text for v in values)
+
+
+def test_no_power_of_ten_stands_for_a_unit_in_words() -> None:
+    """An axis of small values may say 1e-3; a value and its interval read as they are."""
+    values = [[RunValue("tilt", "attitude", "usv", "gain", 1.3e-4 + 1e-6 * k, 2.5e-4,
+                        (-3.6e-4, 6.2e-4))]
+              for k in range(4)]  # fmt: skip
+    runs = [cast(WatchedRun, SimpleNamespace(run=k, values=v)) for k, v in enumerate(values, 1)]
+    drawn = courses(runs, [("tilt", "attitude", "usv", "gain")], {})
+    says = drawn.told[0].says
+    told = [says[label].replace("\u2212", "-") for label in ("Value", "95 % interval")]
+    assert told == ["0.00013", "-0.00036 to 0.00062"]
 
 
 def test_many_runs_have_round_ticks_and_a_table_of_bounded_height(

@@ -37,6 +37,10 @@ def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
         places, begins = _placed(trace)
         size, unit = _operation(places[-1])
         places, begins = [p / size for p in places], [p / size for p in begins]
+        first = {point.session: point.time_s for point in reversed(trace)}
+        for place, point in zip(places, trace, strict=True):
+            says = _says(point, point.time_s - first[point.session])
+            tell(axes, place, 0.5 * (point.low_s + point.high_s), says)
         axes.vlines(places, [p.low_s for p in trace], [p.high_s for p in trace], color=SERIES[0],
                     linewidth=0.8)  # fmt: skip
         axes.plot(places, [0.5 * (p.low_s + p.high_s) for p in trace], ".", markersize=1.6,
@@ -58,6 +62,14 @@ def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
     if bound_s:
         spoken += f", bound {numbers.time(bound_s)}"
     return draw("fig-offsets", "Offset over time", spoken, (WIDTH, 240.0), build)
+
+
+def _says(point: TracePoint, since_s: float) -> list[tuple[str, str]]:
+    """A stretch of a session: since its begin, and between which offsets it stays."""
+    ends = [numbers.time(end) for end in (point.low_s, point.high_s)]
+    told = ends[0] if ends[0] == ends[1] else " to ".join(ends)
+    return [("Session", str(point.session)), ("Since its begin", numbers.duration(since_s)),
+            ("Offset", told)]  # fmt: skip
 
 
 def _placed(trace: Sequence[TracePoint]) -> tuple[list[float], list[float]]:

@@ -90,15 +90,16 @@ def _panel(
     shown = [(place, v) for place, v in points if v.interval95 is not None]
     scale, unit = _scale([v.interval95 or () for _, v in shown], key[3])
     colour = BAD if since else SERIES[0]
-    decimals = _decimals([(v.interval95[1] - v.interval95[0]) / scale for _, v in shown
+    size, named = _of_words(scale, unit)
+    decimals = _decimals([(v.interval95[1] - v.interval95[0]) / size for _, v in shown
                           if v.interval95 is not None])  # fmt: skip
     for place, v in shown:
         low, high = v.interval95 or (0.0, 0.0)
-        value, *ends = (numbers.places(x / scale, decimals) for x in (v.value, low, high))
+        value, *ends = (numbers.places(x / size, decimals) for x in (v.value, low, high))
         tell(axes, place, v.value / scale, [
             ("Run", str(runs[place].run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
-            ("Value", f"{value} {unit}".strip()),
-            ("95 % interval", " to ".join(f"{end} {unit}".strip() for end in ends)),
+            ("Value", f"{value} {named}".strip()),
+            ("95 % interval", " to ".join(f"{end} {named}".strip() for end in ends)),
         ])  # fmt: skip
     _intervals(axes, [(place, v.interval95 or (0.0, 0.0)) for place, v in shown], scale, colour)
     drawn = (
@@ -163,6 +164,11 @@ def _scale(intervals: Sequence[Sequence[float]], parameter: str) -> tuple[float,
         power, f"1e{exponent}{' rad/s' if suffix == 'radps' else ''}")  # fmt: skip
 
 
+def _of_words(scale: float, unit: str) -> tuple[float, str]:
+    """The same for words: no power of ten stands for a unit there."""
+    return (1.0, unit.partition(" ")[2]) if unit.startswith("1e") else (scale, unit)
+
+
 def by_log(logs: Sequence[PerLog], common: Mapping[str, Estimate], name: str) -> InlineChart:
     """A panel a parameter: what each log by itself tells, with its interval; common: one value."""
     names = drawn_by_log(logs)
@@ -201,13 +207,14 @@ def _logs_panel(
         low, high = common.interval95
         axes.axhspan(low / scale, high / scale, color=SHADE, linewidth=0, zorder=0)
         axes.axhline(0.5 * (low + high) / scale, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
+    size, named = _of_words(scale, unit)
     for one, (low, high) in zip(logs, ends, strict=True):
         own = one.parameters[parameter]
         axes.plot([one.log] * 2, [low / scale, high / scale], color=SERIES[0], linewidth=1.4)
         axes.plot([one.log], [0.5 * (low + high) / scale], "o", color=SERIES[0], markersize=4)
         tell(axes, one.log, 0.5 * (low + high) / scale, [
             ("Log", f"{one.log}, {one.file}"), ("Value", own.text),
-            ("95 % interval", _interval(low / scale, high / scale, unit)),
+            ("95 % interval", _interval(low / size, high / size, named)),
         ])  # fmt: skip
     figure, _, _ = parameter.rpartition("_")
     axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")

@@ -26,6 +26,7 @@ from syncline_design.report.study_words import (
     boundary_table,
     currency_sentence,
     heat_table,
+    misses_table,
     outcome,
     rule_sentence,
     setting,
@@ -79,6 +80,8 @@ def on_study(result: StudyResult) -> Document:
             *section("sampled", "Sample", _sampled(summary)),
             *section("winners", "Which sensor and method wins where, of the cases that meet",
                      winners, "What wins where"),
+            *section("misses", "Which requirements fail",
+                     show(misses_table(summary), silent=True), "What fails"),
             *section("ends", "Where feasibility ends", _ends(summary), "Where it ends"),
             *section("fronts", "Cost against error, front by case", _fronts(summary), "Fronts"),
             *section("cases", "Cases", cases),
@@ -98,6 +101,9 @@ def _heat(summary: StudySummary) -> list[Node]:
         "Least cost of a payload that meets the requirements; the stronger the colour, the dearer. "
         "A cross: computed, and no case is known to meet."
     )
+    if len(summary.result.study.bases) > 1:
+        least = "Of several bases the one that costs least is shown."
+        caption, shown = f"{caption} {least}", replace(shown, note=f"{shown.note} {least}".strip())
     short = show(shown, silent=True, reach="text")
     whole = show(shown, silent=True, reach="page")
     if len(shown.rows) > MOST_DOWN:
@@ -131,6 +137,8 @@ def _says(
     """A case in words: number, setting, answer, price, error, payload."""
     values = [(short_key(f.key), shown_value(f, brief.labels[i])) for i, f in several]
     found = [("Case", str(brief.number)), *values, ("Verdict", brief.verdict)]
+    if brief.failing:
+        found.append(("Fails", ", ".join(brief.failing)))
     if brief.cost is not None:
         found.append(("Price", numbers.money(brief.cost, brief.currency)))
     if brief.error_m is not None:
@@ -249,7 +257,7 @@ def _case_table(summary: StudySummary) -> Table:
         rows.append([
             Cell(str(brief.number), float(brief.number)), *named,
             *_setting_cells(brief, several),
-            Cell(shown.word, tone=shown.tone, mark=shown.mark),
+            Cell(shown.word, tone=shown.tone, mark=shown.mark, sub=_failing(brief)),
             Cell(numbers.money(brief.cost, brief.currency), brief.cost),
             Cell(numbers.error(brief.error_m, limit), brief.error_m),
             Cell(why),
@@ -265,6 +273,11 @@ def _case_table(summary: StudySummary) -> Table:
     more = len(summary.briefs) - MOST_CASES
     note = f"{more} further cases are in the CSV and Parquet tables." if more > 0 else ""
     return table("All cases", heads, rows, note)
+
+
+def _failing(brief: Brief) -> str:
+    """Ids of what its design fails, where no word beside them says so."""
+    return ", ".join(visible(one) for one in brief.failing if one not in brief.waived)
 
 
 def _setting_cells(brief: Brief, several: list[tuple[int, Factor]]) -> list[Cell]:

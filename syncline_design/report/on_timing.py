@@ -383,7 +383,7 @@ def _noise(result: Timing) -> list[Node]:
         rows = [(Cell(numbers.time(p.tau_s), p.tau_s), Cell(numbers.time(p.tdev_s), p.tdev_s),
                  Cell(numbers.time(p.mtie_s), p.mtie_s)) for p in result.stability]  # fmt: skip
         points = table("TDEV and MTIE", ("Averaging time #", "TDEV #", "MTIE #"), rows)
-        nodes += show(points, reach="page")
+        nodes += show(points, reach="text")
     hold = [(format_duration(p.after_s), Cell(numbers.time(p.error_s), p.error_s))
             for p in result.holdover]  # fmt: skip
     held = table("Holdover: error after a time without reference",

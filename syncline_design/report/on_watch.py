@@ -354,14 +354,14 @@ def _effects(found: Watch) -> list[Node]:
 
 
 def _runs(found: Watch) -> list[Node]:
-    heads = ("Run", "File", "First stamp", "Rows #", "Alone", "Named alone", "E-value #")
+    heads = ("Run", "State", "File", "First stamp", "Rows #", "Alone", "Named alone", "E-value #")
     return latest("Runs", heads, [_row(one) for one in _compared(found)], MOST_RUNS)
 
 
 def _row(one: WatchedRun) -> Sequence[Cell | str]:
     e_value = "" if one.e_value is None else e_value_text(one.e_value)
-    mark = "\u2013" if one.left_out else "+" if one.new else ""
-    return (Cell(str(one.run), one.run, mark=mark), ", ".join(one.files), one.date or "",
+    state = "left out" if one.left_out else "new" if one.new else ""
+    return (Cell(str(one.run), one.run), state, ", ".join(one.files), one.date or "",
             Cell(numbers.count(one.rows), one.rows), one.verdict, "; ".join(one.named),
             Cell(e_value, one.e_value))  # fmt: skip
 

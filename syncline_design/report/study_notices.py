@@ -12,6 +12,7 @@ from syncline_design.report.github import github_command
 from syncline_design.report.sarif import sarif_log
 from syncline_design.report.study_words import outcome, rule_sentence
 from syncline_design.report.text import unticked, visible
+from syncline_design.report.verdict_words import waiver_text
 from syncline_design.studies.finished import CaseResult
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.table import reason
@@ -26,6 +27,7 @@ class _Miss:
     id: str = ""
     line: int | None = None
     column: int | None = None
+    waiver: str = ""  # in force: it does not count
 
 
 @dataclass
@@ -43,7 +45,7 @@ def study_notices(result: StudyResult) -> list[Notice]:
     totals: dict[int, int] = {}
     for case in result.cases():
         totals[case.base] = totals.get(case.base, 0) + 1
-        for miss in _misses(case):
+        for miss in (*_misses(case), *_waived(case)):
             tally = tallies.setdefault((case.base, miss.id, miss.rule), _Tally(miss, case))
             tally.count += 1
     return [
@@ -68,18 +70,25 @@ def _misses(case: CaseResult) -> Iterator[_Miss]:
         yield _Miss(case.verdict, reason(case))
 
 
+def _waived(case: CaseResult) -> Iterator[_Miss]:
+    """What a waiver in force covers."""
+    for row in case.record.requirements if case.record.design is not None else ():
+        if row.status == "fail" and row.is_waived:
+            sentence = requirement_sentence(row)
+            yield _Miss(row.kind, sentence, row.id, row.line, row.column, waiver_text(row))
+
+
 def _finding(result: StudyResult, tally: _Tally, total: int) -> Notice:
     miss = tally.miss
-    level: Level = "warning"
-    if result.verdict != "meets":
+    level: Level = "waived" if miss.waiver else "warning"
+    if result.verdict != "meets" and not miss.waiver:
         level = "undecided" if miss.rule == "indeterminate" else "fail"
     message = (
         f"missed in {tally.count} of {total} cases of the study {result.study.name}; first at "
         f"{setting_text(tally.first)}: {miss.message}"
     )
-    return Notice(
-        level, miss.rule, miss.id, tally.first.file, miss.line or 1, miss.column or 1, message
-    )
+    place = (miss.line or 1, miss.column or 1)
+    return Notice(level, miss.rule, miss.id, tally.first.file, *place, message, miss.waiver)
 
 
 def setting_text(case: CaseResult) -> str:

@@ -9,6 +9,8 @@ from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
 from syncline_design.report.table import CORNER, Cell, Table, table
+from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import expired_text, kind_text, waiver_text
 from syncline_design.report.words import OUTCOMES, VERBS
 from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
@@ -16,8 +18,8 @@ from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (
     HeatMap,
     StudySummary,
-    Winner,
     boundaries,
+    misses,
     varied,
     winners,
 )
@@ -57,7 +59,28 @@ def varied_table(summary: StudySummary) -> Table:
          Cell(str(len(factor.axis)), float(len(factor.axis))), Cell(_values_of(factor))]
         for _, factor in varied(summary)
     ]  # fmt: skip
+    bases = summary.result.study.bases
+    if len(bases) > 1:
+        rows.insert(
+            0,
+            [
+                Cell("base"),
+                Cell("base", code=True),
+                Cell(str(len(bases)), float(len(bases))),
+                Cell(_bases(summary)),
+            ],
+        )
     return table("What varies", ["Name", "In the spec", "Values #", "Which"], rows)
+
+
+def _bases(summary: StudySummary) -> str:
+    """`Harbour (12 of 20 meet), Harbour, no wire (none of 20 meets)`."""
+    told = []
+    for place, base in enumerate(summary.result.study.bases):
+        found = [brief.meets for brief in summary.briefs if brief.base == place]
+        many = f"{sum(found) or 'none'} of {len(found)} {'meet' if sum(found) > 1 else 'meets'}"
+        told.append(f"{visible(base.name)} ({many})")
+    return ", ".join(told)
 
 
 def _values_of(factor: Factor) -> str:
@@ -72,17 +95,19 @@ def _values_of(factor: Factor) -> str:
 def outcome(result: StudyResult) -> Outcome:
     """The study's outcome as colour, symbol and word."""
     shown = OUTCOMES[result.verdict]
-    return Outcome(shown.tone, shown.mark, f"{count_sentence(result)}")
+    return Outcome(shown.tone, shown.mark, count_sentence(result) + expired_text(result.lapsed))
 
 
 def count_sentence(result: StudyResult) -> str:
     """`13 of 25 cases meet their requirements, 12 are infeasible`."""
     verbs = VERBS | {"refused": (_COMBINED, _COMBINED)}
     counts = result.counts
-    parts = [f"{counts['meets']} of {len(result)} cases {verbs['meets'][counts['meets'] != 1]}"]
+    met, every = numbers.count(counts["meets"]), numbers.count(len(result))
+    parts = [f"{met} of {every} cases {verbs['meets'][counts['meets'] != 1]}"]
     if result.waived:
         parts[0] += f" ({result.waived} with waived ones missed)"
-    parts += [f"{n} {verbs[word][n > 1]}" for word, n in counts.items() if n and word != "meets"]
+    others = [(word, n) for word, n in counts.items() if n and word != "meets"]
+    parts += [f"{numbers.count(n)} {verbs[word][n > 1]}" for word, n in others]
     return sentence_list(parts)
 
 
@@ -175,25 +200,45 @@ def winners_table(summary: StudySummary) -> Table:
     rows = [
         [
             Cell(w.role), Cell(w.name), Cell(w.timestamping),
-            Cell(f"{w.cases} of {w.of}", float(w.cases)), *_where_cells(several, w),
+            Cell(f"{w.cases} of {w.of}", float(w.cases)),
+            *_where_cells(several, w.where, everywhere=w.cases == w.of),
         ]
         for w in winners(summary, shown_value)
     ]  # fmt: skip
-    places = [f"At {key}" for key in several] if len(several) <= MOST_KEYS else ["At"]
-    heads = ["Role", "Sensor", "Timestamping", "Chosen in #", *places]
+    heads = ["Role", "Sensor", "Timestamping", "Chosen in #", *_at(several)]
     caption = "Which sensor and method wins where, of the cases that meet"
     return table(caption, heads, rows, named_by=1)
 
 
-def _where_cells(keys: list[str], winner: Winner) -> list[Cell]:
-    """A cell per key, or one that leaves out the keys over which an option wins everywhere."""
+def _at(keys: list[str]) -> list[str]:
+    return [f"At {key}" for key in keys] if len(keys) <= MOST_KEYS else ["At"]
+
+
+def _where_cells(
+    keys: list[str], where: tuple[str, ...], *, everywhere: bool = False
+) -> list[Cell]:
+    """A cell per key, or one that leaves out the keys over all of whose values it is so."""
     if len(keys) <= MOST_KEYS:
-        return [Cell(text) for text in winner.where]
-    if winner.cases == winner.of:
+        return [Cell(text) for text in where]
+    if everywhere:
         return [Cell("every case that meets")]
-    told = [f"{key} {text}" for key, text in zip(keys, winner.where, strict=True)
-            if text != "everywhere"]  # fmt: skip
+    told = [f"{key} {text}" for key, text in zip(keys, where, strict=True) if text != "everywhere"]
     return [Cell("; ".join(told) or "everywhere")]
+
+
+def misses_table(summary: StudySummary) -> Table:
+    """Which requirements designs fail, in how many cases and where."""
+    several = [short_key(factor.key) for _, factor in varied(summary)]
+    rows = []
+    for one in misses(summary, shown_value):
+        row = summary.missed[one.requirement]
+        rows.append([
+            Cell(one.requirement), Cell(kind_text(row)),
+            Cell(f"{one.cases} of {one.of}", float(one.cases)), Cell(waiver_text(row)),
+            *_where_cells(several, one.where),
+        ])  # fmt: skip
+    heads = ["Requirement", "Limits", "Fails in #", "Waiver", *_at(several)]
+    return table("Which requirements fail", heads, rows)
 
 
 def boundary_table(summary: StudySummary, most: int = MOST_ROWS) -> Table:

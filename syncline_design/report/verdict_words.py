@@ -69,8 +69,13 @@ def outcome(verdict: Checked) -> Outcome:
 def _expired(rows: Sequence[RequirementResult]) -> str:
     """Whose waiver is over, of what is missed; nothing where there is none."""
     over = [row for row in rows if row.status == "fail" and row.waiver and row.waiver.expired]
-    names = sentence_list([visible(row.id) for row in over])
-    return f", {'waiver' if len(over) == 1 else 'waivers'} of {names} expired" if over else ""
+    return expired_text([row.id for row in over])
+
+
+def expired_text(ids: Sequence[str]) -> str:
+    """`, waiver of R8 expired`; nothing where there is none."""
+    names = sentence_list([visible(one) for one in ids])
+    return f", {'waiver' if len(ids) == 1 else 'waivers'} of {names} expired" if ids else ""
 
 
 def waived_of(word: Word, rows: Sequence[RequirementResult]) -> tuple[str, ...]:

@@ -223,10 +223,10 @@ def _rate_errors(spec: Spec) -> list[Located]:
             hint = did_you_mean(code, CURRENCIES)
             error = refusal("unknown currency", f"one of {', '.join(CURRENCIES)}", code, hint)
             errors.append((("exchange_rates", code), error))
-        elif rate.currency != spec.currency:
+        elif code != spec.currency and rate.currency != spec.currency:
             wanted = f"what 1 {code} is worth in {spec.currency}"
             errors.append((("exchange_rates", code), refusal("wrong currency", wanted, rate.text)))
-        elif code == spec.currency and rate.exact != 1:
+        elif code == spec.currency and (rate.currency != code or rate.exact != 1):
             own = refusal("the spec's own currency", f"1 {code}, or no rate", rate.text)
             errors.append((("exchange_rates", code), own))
     return errors

@@ -42,6 +42,17 @@ class CaseResult:
         return {key: label(value) for key, value in self.settings}
 
 
+@dataclass(frozen=True, slots=True)
+class _End:
+    """How a case ended: verdict, what was not simulated, whether a waiver was made use of, which
+    were over."""
+
+    verdict: CaseWord
+    not_simulated: tuple[str, ...]
+    waived: bool
+    lapsed: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Finished:
     """A finished study; iterate `cases()` for its results, in the order of the study."""
@@ -79,29 +90,35 @@ class Finished:
         return (self.case(index) for index in range(len(self.keys)))
 
     @cached_property
-    def _ends(self) -> Counter[tuple[CaseWord, tuple[str, ...], bool]]:
-        """How often cases ended how, with what was not simulated, and whether a waiver was made use
-        of: every record read once."""
+    def _ends(self) -> Counter[_End]:
+        """How often cases ended how: every record read once."""
         records = map(self._record, range(len(self.keys)))
-        return Counter((one.verdict, one.not_simulated, bool(one.waived)) for one in records)
+        return Counter(
+            _End(one.verdict, one.not_simulated, bool(one.waived), one.lapsed) for one in records
+        )
 
     @cached_property
     def counts(self) -> dict[CaseWord, int]:
         """How many cases ended how."""
         found = dict.fromkeys(VERDICTS, 0)
-        for (word, *_), count in self._ends.items():
-            found[word] += count
+        for end, count in self._ends.items():
+            found[end.verdict] += count
         return found
 
     @property
     def waived(self) -> int:
         """How many cases meet although a waived requirement is missed."""
-        return sum(count for (_, _, waived), count in self._ends.items() if waived)
+        return sum(count for end, count in self._ends.items() if end.waived)
+
+    @property
+    def lapsed(self) -> tuple[str, ...]:
+        """Requirements that some case misses and whose waiver is over."""
+        return tuple(sorted({i for end in self._ends for i in end.lapsed}))
 
     @property
     def not_simulated(self) -> tuple[str, ...]:
         """Requirements that no case decided because the study leaves Monte Carlo out."""
-        return tuple(sorted({i for _, left_out, _ in self._ends for i in left_out}))
+        return tuple(sorted({i for end in self._ends for i in end.not_simulated}))
 
     @property
     def verdict(self) -> StudyWord:

@@ -91,6 +91,12 @@ class CaseRecord(Record):
         return waived_misses(self.requirements) if self.verdict == "meets" else ()
 
     @property
+    def lapsed(self) -> tuple[str, ...]:
+        """Ids of requirements that a case misses and whose waiver is over."""
+        missed = (row for row in self.requirements if row.status == "fail" and row.waiver)
+        return tuple(row.id for row in missed if not row.is_waived)
+
+    @property
     def cost(self) -> float | None:
         """Of the design; None where there is none, or where its price is unknown."""
         return None if self.design is None else self.design.cost

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import field
 from itertools import pairwise
 from typing import Any
 
@@ -10,7 +11,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.studies.definition import Factor
 from syncline_design.studies.finished import CaseResult, Finished
-from syncline_design.studies.record import CasePoint, CaseWord, RolePick
+from syncline_design.studies.record import CasePoint, CaseRecord, CaseWord, RolePick
 from syncline_design.verdict.tree import RequirementResult
 
 MOST_FRONTS = 500
@@ -31,6 +32,7 @@ class Brief:
     currency: str
     error_m: float | None
     picks: tuple[RolePick, ...]
+    failing: tuple[str, ...] = ()  # ids of requirements, waived ones too
     waived: tuple[str, ...] = ()
 
     @property
@@ -52,13 +54,15 @@ class StudyFront(Record):
 class StudySummary:
     """Every case in a line, and the fronts that differ.
 
-    accuracy: the first case's, in the unit of whose limit a page tells errors.
+    accuracy: the first case's, in the unit of whose limit a page tells errors.  missed: by id, what
+    some design fails, as the first that does.
     """
 
     result: Finished
     briefs: tuple[Brief, ...]
     fronts: tuple[StudyFront, ...]
     accuracy: RequirementResult | None = None
+    missed: Mapping[str, RequirementResult] = field(default_factory=dict)
 
     @property
     def currencies(self) -> tuple[str, ...]:
@@ -97,6 +101,16 @@ class Winner(RolePick):
 
 
 @dataclass(frozen=True, slots=True)
+class Miss(Record):
+    """One requirement that designs fail: in how many of how many cases with one, and where."""
+
+    requirement: str
+    cases: int
+    of: int
+    where: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Boundary(Record):
     """Along one factor, everything else fixed: neighbours of which one meets and one does not.
 
@@ -115,8 +129,12 @@ def summarise(result: Finished) -> StudySummary:
     briefs: list[Brief] = []
     fronts: dict[tuple[tuple[CasePoint, ...], str], list[int]] = {}
     accuracy = None
+    missed: dict[str, RequirementResult] = {}
     for case in result.cases():
         briefs.append(_brief(case))
+        for row in case.record.requirements if case.record.design is not None else ():
+            if row.status == "fail":
+                missed.setdefault(row.id, row)
         asked = (row for row in case.record.requirements if row.kind == "accuracy")
         accuracy = accuracy or next(asked, None)
         points = case.record.front
@@ -126,15 +144,21 @@ def summarise(result: Finished) -> StudySummary:
     found = (
         StudyFront(tuple(cases), currency, points) for (points, currency), cases in fronts.items()
     )
-    return StudySummary(result, tuple(briefs), tuple(found), accuracy)
+    return StudySummary(result, tuple(briefs), tuple(found), accuracy, missed)
 
 
 def _brief(case: CaseResult) -> Brief:
     record = case.record
     return Brief(
         case.number, case.base, tuple(case.labels.values()), record.verdict, record.cost,
-        case.currency, record.error_m, tuple(record.picks), record.waived,
+        case.currency, record.error_m, tuple(record.picks), _failing(record), record.waived,
     )  # fmt: skip
+
+
+def _failing(record: CaseRecord) -> tuple[str, ...]:
+    """What its design fails; without one its requirements are no more than in conflict."""
+    rows = record.requirements if record.design is not None else ()
+    return tuple(row.id for row in rows if row.status == "fail")
 
 
 def varied(summary: StudySummary) -> list[tuple[int, Factor]]:
@@ -229,6 +253,18 @@ def _winner(
     return Winner(
         pick.role, pick.sensor, pick.name, pick.timestamping, len(choosing), having, where
     )
+
+
+def misses(summary: StudySummary, show: Shown = lambda _, label: label) -> list[Miss]:
+    """Requirements that designs fail, most frequent first."""
+    designed = [brief for brief in summary.briefs if brief.picks]
+    several = varied(summary)
+    found = []
+    for name in summary.missed:
+        failing = [brief for brief in designed if name in brief.failing]
+        where = tuple(_extent(one, {b.labels[i] for b in failing}, show) for i, one in several)
+        found.append(Miss(name, len(failing), len(designed), where))
+    return sorted(found, key=lambda one: -one.cases)
 
 
 def _extent(factor: Factor, present: set[str], show: Shown) -> str:

@@ -37,7 +37,7 @@ def columns(result: Finished) -> list[str]:
     names += ["verdict", *FIGURES, "currency"]
     for role in _roles(result):
         names += [role, f"{role} timestamping"]
-    return [*names, "failing", "not_simulated", "reason"]
+    return [*names, "failing", "waived", "not_simulated", "reason"]
 
 
 def text_columns(result: Finished) -> set[str]:
@@ -79,6 +79,7 @@ def row(case: CaseResult, units: Mapping[str, str | None]) -> Row:
         found[pick.role] = pick.sensor
         found[f"{pick.role} timestamping"] = pick.timestamping
     found["failing"] = " ".join(one.id for one in record.requirements if one.status == "fail")
+    found["waived"] = " ".join(record.waived)
     found["not_simulated"] = " ".join(record.not_simulated)
     found["reason"] = reason(case)
     return found
