@@ -21,6 +21,7 @@ import pytest
 import yaml
 
 from plain_enumeration import Enumeration, Outcome, failed, limits_of
+from study_specs import SPEC
 from syncline_design.choice.problem import selection_of
 from syncline_design.comparison.diff import diff
 from syncline_design.report import verdict_words
@@ -30,7 +31,7 @@ from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_diff import on_diff
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
-from syncline_design.spec.load import load, load_text
+from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.verdict.baseline import against
 from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.pinned import picked_design
@@ -249,6 +250,16 @@ def test_who_needs_a_system_gets_the_same_design(waived: tuple[Path, str]) -> No
     roles = [(one.sensor, one.method) for one in selection_of(problem, design).roles]
     assert verdict.design is not None
     assert roles == [(one.sensor, one.timestamping) for _, _, one in verdict.design.roles]
+
+
+@pytest.mark.parametrize("day", ["20261130", '"20261231"', '"2026-W50-1"', "2026-02-30", "soon"])
+def test_a_day_is_written_in_one_way(tmp_path: Path, day: str) -> None:
+    """`20261130` was told to be put in quotes, and taken with them."""
+    waiver = f"waiver: {{reason: x, expires: {day}}}"
+    path = tmp_path / "spec.yaml"
+    path.write_text(SPEC.replace("100000 EUR", f"100000 EUR, {waiver}"), "utf-8")
+    with pytest.raises(BadInput, match="not a date; expected a date such as 2027-01-31"):
+        load(path)
 
 
 def test_an_expired_waiver_is_loud_and_helps_nothing(waived: tuple[Path, str]) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from datetime import date
 from itertools import pairwise
 from typing import Annotated, Any, Final, Literal
 
@@ -20,6 +19,7 @@ from pydantic_core import PydanticCustomError
 from syncline_design.model.conversion import conversion_of, kinds
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.fields import (
+    Day,
     FileRecord,
     NonEmptyText,
     NonNegativeLength,
@@ -235,16 +235,6 @@ class FieldOfView(FileRecord):
         if errors:
             raise refusals(errors)
         return self
-
-
-def _read_date(value: Any) -> str:
-    try:
-        return date.fromisoformat(value).isoformat()
-    except (TypeError, ValueError):
-        raise refusal("not a date", "a date such as 2026-11-22", kind_of(value)) from None
-
-
-Day = Annotated[str, ReadBy(_read_date, {"type": "string", "format": "date"})]
 
 
 class Lifecycle(FileRecord):

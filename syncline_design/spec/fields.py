@@ -7,8 +7,10 @@ is never reported for all.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import Annotated, Any, TypeVar
+from datetime import date
+from typing import Annotated, Any, Final, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -37,6 +39,7 @@ from syncline_design.spec.yaml_text import KeyPath
 T = TypeVar("T")
 R = TypeVar("R", bound="FileRecord")
 MAX_SUGGESTIONS = 50  # of one record or list: more errors than that are no typing slips
+_DAY: Final = re.compile(r"\d{4}-\d\d-\d\d")
 
 
 def refusal(
@@ -184,6 +187,18 @@ class ReadBy:
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         return dict(self.schema)
+
+
+def _read_day(value: Any) -> str:
+    try:
+        if _DAY.fullmatch(value):
+            return date.fromisoformat(value).isoformat()
+    except (TypeError, ValueError):
+        pass
+    raise refusal("not a date", "a date such as 2027-01-31", kind_of(value))
+
+
+Day = Annotated[str, ReadBy(_read_day, {"type": "string", "format": "date"})]
 
 
 def figure_of(

@@ -15,6 +15,7 @@ from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.unit_table import SI_UNITS
 from syncline_design.spec.fields import (
+    Day,
     FileRecord,
     NonEmptyText,
     read_number,
@@ -108,16 +109,7 @@ class Waiver(FileRecord):
     """Why a requirement may be missed, and until when."""
 
     reason: NonEmptyText
-    expires: str  # a date, 2027-01-31; the requirement counts again after it
-
-    @reads_field("expires", mode="after")
-    @classmethod
-    def _is_date(cls, value: str) -> str:
-        try:
-            date.fromisoformat(value)
-        except ValueError:
-            raise refusal("not a date", "a date such as 2027-01-31", repr(value)) from None
-        return value
+    expires: Day  # the requirement counts again after it
 
     def holds_on(self, day: date) -> bool:
         """Whether the waiver still counts; its last day does."""
