@@ -284,7 +284,7 @@ def _left(result: Audit) -> Table:
     ]  # fmt: skip
     heads = ("Stream", "At most #", "95 % #", "As recorded #", "\u03c4_crit #",
              "At most / \u03c4_crit #", "Error at most #", "Would show a step of #",
-             "a drift of #")  # fmt: skip
+             "Would show a drift of #")  # fmt: skip
     return table("Residuals", heads, rows)
 
 
