@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis.level import demand_level
 from syncline_design.diagnosis.mending import Reread, mended
+from syncline_design.diagnosis.set_back import set_back
 from syncline_design.effects.acting import Acting, acting_of
 from syncline_design.logs.columns import ISO_TIMES, known_names, shown
 from syncline_design.logs.given_once import demand_once
 from syncline_design.logs.log import Log
 from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.pose_pairs import lever_m
-from syncline_design.logs.reading import read_log
+from syncline_design.logs.reading import holds_poses, read_log
 from syncline_design.logs.static_arms import spec_arms
 from syncline_design.logs.stream_sources import laid_by
 from syncline_design.machine.quick_dataclass import dataclass
@@ -59,12 +61,14 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
         return replace(log, laid=laid_by(sources))
 
     log = read(0.0)
-    reread = read if len(sources) > 1 else None
+    reread: Reread | None = read if len(sources) > 1 else None
     system = replace(system, stages=system.stages[: len(log.stages)])
     if log.kind == "pose":  # no ranging sensor took part in it
         system = replace(system, stages=(replace(system.stages[0], ranging=None),))
     _demand_fit(case, system, log)
     known = acting_of(system)
+    if reread and any(holds_poses(one, choice.columns, names) for one in sources):
+        reread = partial(set_back, system, log, whole=read)
     if files:
         demand_level(files[0], system, log, known)
     for one in known:

@@ -23,7 +23,9 @@ from syncline_design.logs.columns import (
     TARGET_ID,
     TIME,
     VELOCITY,
+    known_names,
     shown,
+    si_columns,
 )
 from syncline_design.logs.derivatives import derived_rate, derived_velocity
 from syncline_design.logs.log import Log, LogKind, LogTrack, StageLog
@@ -110,6 +112,15 @@ def read_log(
         draft.notes.append(with_points(draft.columns, prefixes[0], pose_lever_m))
     demand_possible(draft.path, draft.columns, prefixes)
     return _log(draft, stages, prefixes, kind, rejected)
+
+
+def holds_poses(source: RowSource, mapping: Mapping[str, str], stages: Sequence[str]) -> bool:
+    """Whether a file holds positions of the first stage and attitudes: both have its stamps."""
+    prefix = f"{stages[0]}_" if len(stages) > 1 else ""
+    several = tuple(stages) if len(stages) > 1 else ()
+    found = si_columns(source.header, mapping, known_names(several))
+    placed = any(prefix + n in found for n in (POSITION[0], GEODETIC[0]))
+    return placed and any(prefix + n in found for n in ATTITUDE)
 
 
 def _draft(tables: Sequence[LogTable], prefixes: Sequence[str]) -> _Draft:
