@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.backlog import held_up
 from syncline_design.auditing.cadence import Cadence, at_another_rate
+from syncline_design.auditing.lasting_jumps import Jump, lasting, of_the_clock, went_on
 from syncline_design.auditing.naming import is_whole, slipped
-from syncline_design.auditing.pauses import LONG_GAP
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import (
     NS,
@@ -55,28 +55,12 @@ _CHANCE: Final = 12.0  # of the delays' spread: so late a queue may make message
 _QUEUE: Final = 64  # messages, which hardly a queue holds up
 _LOADED: Final = 4096  # messages, of which no load of a host holds up all
 _SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
-_BACK: Final = 0.3  # of a jump: what returns by more settles, and is no step
 _LEAST_SETS: Final = 6  # jumps that come in a beat
 _LEAST_EQUAL: Final = 4  # by one size
 _BEAT: Final = 0.1  # of the time between them
 _PARTS: Final = (1, 2, 3)  # of the least time between jumps
 _EQUAL: Final = 0.02
 _SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
-
-
-@dataclass(frozen=True, slots=True)
-class Jump:
-    """Stamps gain `size_s` with the message at `place` (among the good ones), until `end`.
-
-    again: one of many by one size, of a clock that is set again and again.  doubted: by whole
-    intervals, and only messages near it show it.
-    """
-
-    place: int
-    size_s: float
-    end: int | None = None
-    again: bool = False
-    doubted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,12 +82,13 @@ def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
     late = seconds((series.receive - series.stamp)[pace.places])
     late = late - np.median(late)
     found = _found(pace, late, least_s)
-    if not found or len(found) > _MOST_JUMPS:
+    found = [] if len(found) > _MOST_JUMPS else of_the_clock(found, times, late, pace)
+    if not found:
         return nothing
-    lasting = _lasting(found, times, late, pace)
-    settling = tuple(float(times[j.place]) for j in found if j not in lasting)
-    lasting = [j for j in lasting if not _went_on(j, [s for s in found if s not in lasting], pace)]
-    found = _paired(lasting, pace.jitter_s)
+    kept = lasting(found, times, late, pace)
+    settling = tuple(float(times[j.place]) for j in found if j not in kept)
+    kept = [j for j in kept if not went_on(j, [s for s in found if s not in kept], pace)]
+    found = _paired(kept, pace.jitter_s)
     known = series.stamp[pace.places]
     found = [jump for jump in found if not _replays(jump, known)]
     stamp = series.stamp.copy()
@@ -275,55 +260,6 @@ def _loaded_floor(before: Array, after: Array) -> float:
     """By how much the quickest of very many are later: a load of the host holds up hundreds by
     more than an interval, and not all of thousands."""
     return float(after[:_LOADED].min() - before[-_LOADED:].min())
-
-
-def _lasting(found: list[Jump], times: Array, late: Array, pace: Cadence) -> list[Jump]:
-    """Those after which the level stays, but for a drift of the whole log: the others settle."""
-    level = late.copy()
-    for jump in found:
-        level[jump.place :] += jump.size_s
-    level = level - _slope(times, level) * (times - times[0])
-    ends = [*(jump.place for jump in found[1:]), late.size]
-    both = zip(found, ends, strict=True)
-    return [
-        j
-        for j, end in both
-        if j.again or _kept_pace(j, end, pace) or not _settles(j, level[j.place : end])
-    ]
-
-
-def _kept_pace(jump: Jump, end: int, pace: Cadence) -> bool:
-    """Whether the stamps after it went on as evenly as before, to less than what settling takes
-    back: a clock that is slewed home stretches the sensor's intervals by as much."""
-    apart = abs(jump.size_s - round(jump.size_s / pace.period_s) * pace.period_s)
-    if apart < _BROKEN * pace.period_s:
-        return False  # by whole intervals, which nobody counts
-    own = slice(jump.place, end - 1)
-    off = np.cumsum(pace.interval[own] - pace.steps[own] * pace.period_s)
-    return off.size >= _BESIDE and float(np.ptp(off)) < _BACK * abs(jump.size_s)
-
-
-def _went_on(jump: Jump, settling: list[Jump], pace: Cadence) -> bool:
-    """Whether a jump is how a lock went on to settle while no message came."""
-    before = [s for s in settling if s.place < jump.place]
-    hole = float(pace.steps[jump.place - 1]) > LONG_GAP
-    return hole and bool(before) and -1.0 < jump.size_s / before[-1].size_s < 0.0
-
-
-def _settles(jump: Jump, level: Array) -> bool:
-    part = max(_LEAST, min(_BESIDE, level.size // 3))
-    if level.size < 2 * part:
-        return False
-    last = level[-max(part, level.size // 4) :]
-    back = float(np.median(last) - np.median(level[:part])) / jump.size_s
-    return back > _BACK
-
-
-def _slope(times: Array, level: Array) -> float:
-    lag = max(1, level.size // 10)
-    passed = times[lag:] - times[:-lag]
-    use = passed > 0.0
-    return float(np.median((level[lag:] - level[:-lag])[use] / passed[use])) if use.any() else 0.0
 
 
 def _paired(found: list[Jump], jitter_s: float) -> list[Jump]:

@@ -17,7 +17,8 @@ from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
 from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.grains import timers
-from syncline_design.auditing.jumps import Jump, without_jumps
+from syncline_design.auditing.jumps import without_jumps
+from syncline_design.auditing.lasting_jumps import Jump
 from syncline_design.auditing.levels import SURE, believed, polished, shapes_of
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.plain_step import without_plain_step
