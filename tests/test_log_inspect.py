@@ -148,6 +148,20 @@ def test_what_cannot_be_read_ends_with_two_and_writes_nothing(tmp_path: Path) ->
     assert "/odom" in out  # what could be read is shown all the same
 
 
+@pytest.mark.parametrize("row", ["nan,inf", "1e30,-1e40"])
+def test_a_file_of_stamps_without_a_time_gives_nothing(tmp_path: Path, row: str) -> None:
+    """As `audit` says; where one of the columns holds times, they are told."""
+    path = tmp_path / "stamps.csv"
+    path.write_text(f"stamp_s,receive_s\n{row}\n{row}\n")
+    code, _, told = run("log", "inspect", path)
+    assert code == 2
+    assert "no message in it has a time" in told
+    path.write_text("stamp_s,receive_s\nnan,1.5\nnan,2.5\n")
+    code, out, _ = run("log", "inspect", path)
+    assert code == 0
+    assert "2 of 2 stamps are 0 or not set" in out
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [

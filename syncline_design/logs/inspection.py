@@ -28,6 +28,7 @@ SCHEMA: Final = "syncline-design/log/v1"
 NANO: Final = 1e9
 LEAST_STEP_S: Final = 1e-6  # between messages; what follows each other quicker are counts
 CALENDARS: Final = ("utc", "gps", "tai")
+_EMPTY: Final = "no message in it has a time; expected at least one message with a stamp"
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,10 +144,13 @@ def inspect_logs(
         except BadInput as error:
             unread.append(UnreadFile(str(path), str(error)))
             continue
+        roles = roles_of_table(path, choice.columns, stages)
+        if found and not roles and all(_is_empty(one) for one in found):
+            unread.append(UnreadFile(str(path), f"{path}: {_EMPTY}"))
+            continue
         recordings.append(recording)
         files.append(_file(recording, found))
         outside = _outside(found)
-        roles = roles_of_table(path, choice.columns, stages)
         streams += [_stream(path, one, outside.get(one.name, ()), roles) for one in found]
     proposal = proposed(recordings, choice, poses, stages)
     static = [pose for one in recordings for stream in one.streams() for pose in stream.static]
@@ -154,6 +158,14 @@ def inspect_logs(
     return LogInspection(
         SCHEMA, __version__, tuple(files), tuple(streams), proposal, tuple(unread), beside
     )  # fmt: skip
+
+
+def _is_empty(stream: Stream) -> bool:
+    """Whether a stream is of stamps alone, and none of them is a time."""
+    if stream.stamps is None or stream.quantity or stream.static or stream.points is not None:
+        return False
+    kinds = (stream.stamps.primary_ns, stream.stamps.secondary_ns)
+    return not any(one is not None and bool(np.any(one != UNSET)) for one in kinds)
 
 
 def _recording(path: Path, choice: LogChoice, stages: Sequence[str]) -> Recording:
