@@ -228,11 +228,11 @@ def _eulers(euler: Array) -> Iterator[tuple[Array, str, Mend, int]]:
                 scale, turn = factor * np.array(signs), np.array([0.0, 0.0, math.radians(quarter)])
                 mended = partial(scaled, scale=scale, turn=turn)
                 work = signs.count(-1.0) + bool(quarter) + (factor != 1.0)
-                words_ = _euler_words(factor, signs, quarter)
-                yield mended(euler), words_, angles_mended(mended), work
-    for scale, words_, work in _angle_units(EULER):
+                said = _euler_words(factor, signs, quarter)
+                yield mended(euler), said, angles_mended(mended), work
+    for scale, said, work in _angle_units(EULER):
         mended = partial(scaled, scale=scale, turn=np.zeros(3))
-        yield mended(euler), words_, angles_mended(mended), work
+        yield mended(euler), said, angles_mended(mended), work
 
 
 def _euler_words(factor: float, signs: tuple[float, ...], quarter_deg: float) -> str:
@@ -306,8 +306,8 @@ def _polar_ways() -> Iterator[tuple[Array, Array, str, int]]:
         scale = np.array([1.0, azimuth * factor, elevation * factor])
         turn = np.radians([0.0, quarter, zero])
         yield scale, turn, ", ".join(words), len(words)
-    for factors, words_, work in _angle_units(POLAR):
-        yield np.concatenate([np.ones(1), factors]), np.zeros(3), words_, work
+    for factors, said, work in _angle_units(POLAR):
+        yield np.concatenate([np.ones(1), factors]), np.zeros(3), said, work
 
 
 def _held(mending_deg: float) -> float:
