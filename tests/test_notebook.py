@@ -6,6 +6,7 @@ import importlib.util
 import json
 import re
 from html.parser import HTMLParser
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import page_looks
 import syncline_design as sd
 from browsing import Opened
 from syncline_design.report import notebook
+from syncline_design.report.palette import VARIABLES
 
 ROOT = Path(__file__).resolve().parent.parent
 VOID = {"path", "use", "rect", "circle", "line", "br", "wbr", "meta", "link", "image", "polygon"}
@@ -77,6 +79,17 @@ def test_a_verdict_is_drawn_without_a_script_and_with_every_figure() -> None:
     assert "0.4474 m" in drawn.text
     assert drawn.tags >= {"table", "details", "svg"}
     assert not drawn.tags & {"script", "iframe", "link", "html", "body", "form"}
+
+
+def test_every_colour_of_a_figure_is_known_in_a_notebook() -> None:
+    """Figures are drawn in the page's variables: without them bars are black and lines are gone."""
+    style = files("syncline_design.templates").joinpath("fragment.css").read_text("utf-8")
+    known = dict(re.findall(r"(--[\w-]+): (#[0-9a-f]{6});", style))
+    assert {name: colour for colour, name in VARIABLES.items()} == known
+    verdict = sd.check(ROOT / "specs" / "usv_wire_missing.yaml", monte_carlo=False)
+    used = set(re.findall(r"var\((--[\w-]+)\)", verdict._repr_html_() or ""))
+    assert used
+    assert used <= set(known)
 
 
 @pytest.mark.browser

@@ -218,6 +218,9 @@ def test_print_is_light_and_complete(browser: Any, report: Path) -> None:
         assert opened.page.is_visible("#provenance")
         opened.page.set_viewport_size({"width": 688, "height": 900})  # A4 less its margins
         assert opened.page.evaluate("() => document.documentElement.scrollWidth") <= 688
+        # else Chromium prints what follows a figure on it
+        kinds = "all => [...new Set(all.map(e => getComputedStyle(e).containerType))]"
+        assert opened.page.eval_on_selector_all("section, .beneath, .drawing", kinds) == ["normal"]
         pdf = opened.page.pdf(format="A4")
         assert pdf.startswith(b"%PDF")
         assert 2 <= pdf.count(b"/Type /Page\n") <= 16

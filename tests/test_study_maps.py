@@ -227,7 +227,34 @@ def test_a_cell_without_a_verdict_is_not_said_to_fail(tmp_path: Path) -> None:
     heat = heat_map(replace(summary, briefs=tuple(briefs)))
     assert heat is not None
     assert heat.undecided == 1
-    assert heat_table(heat).note == "In 1 cells a case got no verdict."
+    shown = heat_table(heat)
+    assert shown.note == "In 1 cell a case got no verdict: what costs less may meet."
+    assert [c.text for row in shown.rows for c in row if c.mark == "?"] == ["not known"]
+
+
+def test_a_cell_says_of_its_price_and_of_none_what_they_rest_on(tmp_path: Path) -> None:
+    """Of what is waived, refused and without a verdict: by the verdicts of its cases, here set."""
+    summary = summarise(done(tmp_path, GRID.format(across=4, up=4)))
+    meeting = [i for i, brief in enumerate(summary.briefs) if brief.meets]
+    briefs = list(summary.briefs)
+    first, second, third = meeting[:3]
+    briefs[first] = replace(briefs[first], waived=("ACC-1",))
+    briefs[second] = replace(briefs[second], verdict="refused", cost=None, picks=())
+    briefs[third] = replace(briefs[third], verdict="indeterminate", cost=None, picks=())
+    heat = heat_map(replace(summary, briefs=tuple(briefs)))
+    assert heat is not None
+    assert heat.cells is not None
+    found = {(x, y): word for y, line in zip(heat.y_values, heat.cells, strict=True)
+             for x, word in zip(heat.x_values, line, strict=True)}  # fmt: skip
+    assert [found[briefs[k].labels] for k in meeting[:3]] == ["waived", "refused", "undecided"]
+    shown = heat_table(heat)
+    marks = {cell.mark for row in shown.rows for cell in row[1:]}
+    assert marks >= {"\u25d0", "\u2013", "?"}
+    for words in ("waived requirement missed", "cannot be as combined", "got no verdict"):
+        assert words in shown.note
+    told = {t.says["Least cost"] for t in cost_map(heat).told}
+    assert {"cannot be as combined", "not known: a case got no verdict"} <= told
+    assert any("with a waived requirement missed" in text for text in told)
 
 
 @pytest.mark.browser

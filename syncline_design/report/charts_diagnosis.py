@@ -9,7 +9,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH, beside
-from syncline_design.report.palette import MUTED, SERIES
+from syncline_design.report.palette import MUTED, PALE, SERIES
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 
@@ -37,7 +37,9 @@ def residuals(
         rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
         for axes, axis in zip(rows, shown, strict=True):
             axes.spines[["top", "right"]].set_visible(False)
-            axes.plot(time_s, axis.before_m, ".", markersize=2.2, color=MUTED, label="before")
+            axes.plot(
+                time_s, axis.before_m, ".", markersize=2.6, color=(MUTED, PALE), label="before"
+            )
             if axis.signature_m:
                 axes.plot(time_s, axis.signature_m, color=SERIES[1], linewidth=1.4,
                           label="named effect")  # fmt: skip

@@ -16,7 +16,7 @@ from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.charts_ways import breadth, from_above, map_height
-from syncline_design.report.palette import INK, MUTED, SERIES
+from syncline_design.report.palette import INK, MUTED, PALE, SERIES
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
@@ -51,14 +51,15 @@ def track_map(track: PlottedTrack, name: str = "fig-track") -> InlineChart:
                   label="way")  # fmt: skip
         before = [(a.before_east_m, a.before_north_m) for a in track.arrows]
         after = [(a.after_east_m, a.after_north_m) for a in track.arrows]
-        for colour, pairs, label in ((MUTED, before, "before"), (SERIES[0], after, "after")):
+        words = ((MUTED, PALE, before, "before"), (SERIES[0], 1.0, after, "after"))
+        for colour, strength, pairs, label in words:
             tips = [(e.east_m + larger * x, e.north_m + larger * y)
                     for e, (x, y) in zip(track.arrows, pairs, strict=True)]  # fmt: skip
             axes.update_datalim(tips)
             axes.quiver(
                 [a.east_m for a in track.arrows], [a.north_m for a in track.arrows],
                 [larger * x for x, _ in pairs], [larger * y for _, y in pairs],
-                angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.005,
+                angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.005, alpha=strength,
                 label=label, zorder=3,
             )  # fmt: skip
         for arrow in track.arrows:
@@ -123,7 +124,8 @@ def _against(
     after: Sequence[tuple[float, float]],
 ) -> None:
     axes.spines[["top", "right"]].set_visible(False)
-    axes.plot(*zip(*before, strict=True), color=MUTED, marker="s", markersize=3, label="before")
+    axes.plot(*zip(*before, strict=True), color=MUTED, marker="s", markersize=3, label="before",
+              linestyle=(0, (4, 2)))  # fmt: skip
     axes.plot(*zip(*after, strict=True), color=SERIES[0], marker="o", markersize=3, label="after")
     unit = "s" if covariate == "time" else UNITS[covariate]
     for word, found in (("before", before), ("after", after)):

@@ -14,13 +14,13 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, GRID, INK, MUTED, SERIES, SURFACE, WARN
-from syncline_design.report.study_words import short_key
+from syncline_design.report.study_words import UNPRICED, WAIVED_SIGN, cell_word, short_key
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 from syncline_design.report.words import BRIEF
 from syncline_design.studies.record import CasePoint
 from syncline_design.studies.scatter import Scatter, ScatterAxis, ScatterPoint
-from syncline_design.studies.summary import HeatMap
+from syncline_design.studies.summary import CellWord, HeatMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +30,12 @@ Says = Sequence[Sequence[tuple[str, str]]]  # of every point: labels and values
 CELL = (0.08, 0.5)  # opacity of the cheapest and of the dearest cell: text stays readable
 MARK = (0.2, 0.9)  # of marks, in which nothing is written: the cheapest is seen to be filled
 MOST_PATCHES = 5  # of a scale of prices
+_UNPRICED = {
+    "none": "no case is known to meet",
+    "undecided": "not known: a case got no verdict",
+    "refused": "cannot be as combined",
+}
+_WAIVED = ", with a waived requirement missed"
 MOST_LABEL = 44  # characters of a front's in a legend
 MOST_TEXT = 8  # cells across in which the cost itself still fits
 PATCH = 24.0  # of the scale, with what is around it [SVG units]
@@ -46,12 +52,14 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
         axes = add_axes(figure)
         for y, row in enumerate(heat.least_cost):
             for x, cost in enumerate(row):
+                word = cell_word(heat, x, y)
                 words = _amount(cost or 0.0, whole) if across <= MOST_TEXT else ""
-                _cell(axes, (x, y), cost, costs, words)
+                words += f" {WAIVED_SIGN}" if word == "waived" else ""
+                _cell(axes, (x, y), word, cost, costs, words.strip())
                 tell(axes, (x - 0.5, x + 0.5), (y - 0.5, y + 0.5), [
                     (short_key(heat.x), heat.x_values[x]), (short_key(heat.y), heat.y_values[y]),
-                    ("Least cost", "no case is known to meet" if cost is None
-                     else numbers.money(cost, heat.currency)),
+                    ("Least cost", _UNPRICED.get(word, "") if cost is None
+                     else numbers.money(cost, heat.currency) + _WAIVED * (word == "waived")),
                     ("Payload", heat.payload[y][x]),
                 ])  # fmt: skip
         axes.set_xlim(-0.5, len(heat.x_values) - 0.5)
@@ -67,22 +75,26 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
         spoken = (
             f"Least cost from {numbers.money(min(costs), heat.currency)} to "
             f"{numbers.money(max(costs), heat.currency)} in {len(costs)} of "
-            f"{len(heat.x_values) * len(heat.y_values)} cells; in the others no case meets."
+            f"{len(heat.x_values) * len(heat.y_values)} cells; in the others no case is known to "
+            "meet."
         )
     height = 140.0 + 30.0 * min(len(heat.y_values), 14)
     return draw(name, "Least cost over two factors", spoken, (WIDTH, height), build)
 
 
 def _cell(
-    axes: Axes, place: tuple[int, int], cost: float | None, costs: Sequence[float], words: str
-) -> None:
+    axes: Axes, place: tuple[int, int], word: CellWord, cost: float | None,
+    costs: Sequence[float], words: str,
+) -> None:  # fmt: skip
     from matplotlib.patches import Rectangle
 
     x, y = place
     corner = (x - 0.5, y - 0.5)
     if cost is None:
         axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=GRID, linewidth=0.6))
-        axes.text(x, y, "\u2715", ha="center", va="center", color=BAD)
+        colour = {"none": BAD, "undecided": WARN}.get(word, MUTED)
+        sign = "\u2715" if word == "none" else UNPRICED[word][2]
+        axes.text(x, y, sign, ha="center", va="center", color=colour)
         return
     axes.add_patch(
         Rectangle(
@@ -143,10 +155,10 @@ def fronts(
         for index, front in enumerate(shown):
             x = [point.cost for point in front.points] + [right]
             y = [point.error_m for point in (*front.points, front.points[-1])]
-            colour, style = SERIES[index % len(SERIES)], styles[index // 2 % len(styles)]
+            colour, style = SERIES[index % len(SERIES)], styles[index % len(styles)]
             axes.step(x, y, where="post", color=colour, linestyle=style, linewidth=1.8,
                       label=shortened(front.label, MOST_LABEL))  # fmt: skip
-            axes.plot(x[:-1], y[:-1], "o", color=colour, markersize=3.5)
+            axes.plot(x[:-1], y[:-1], "os"[index // len(styles) % 2], color=colour, markersize=3.5)
             for point in front.points:
                 tell(axes, point.cost, point.error_m, [
                     ("Front", front.label), ("Price", numbers.money(point.cost, currency)),

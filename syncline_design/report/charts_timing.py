@@ -68,7 +68,7 @@ def _says(point: TracePoint, since_s: float) -> list[tuple[str, str]]:
     """A stretch of a session: since its begin, and between which offsets it stays."""
     ends = [numbers.time(end) for end in (point.low_s, point.high_s)]
     told = ends[0] if ends[0] == ends[1] else " to ".join(ends)
-    return [("Session", str(point.session)), ("Since its begin", numbers.duration(since_s)),
+    return [("Session", str(point.session)), ("Since its begin", numbers.si_quantity(since_s, "s")),
             ("Offset", told)]  # fmt: skip
 
 

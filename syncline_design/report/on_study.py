@@ -24,6 +24,7 @@ from syncline_design.report.study_words import (
     MOST_DOWN,
     MOST_KEYS,
     boundary_table,
+    cell_notes,
     currency_sentence,
     heat_table,
     misses_table,
@@ -101,6 +102,7 @@ def _heat(summary: StudySummary) -> list[Node]:
         "Least cost of a payload that meets the requirements; the stronger the colour, the dearer. "
         "A cross: computed, and no case is known to meet."
     )
+    caption = f"{caption} {cell_notes(heat)}".strip()
     if len(summary.result.study.bases) > 1:
         least = "Of several bases the one that costs least is shown."
         caption, shown = f"{caption} {least}", replace(shown, note=f"{shown.note} {least}".strip())

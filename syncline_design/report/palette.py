@@ -21,6 +21,8 @@ SERIES: Final = (
     "#0b58a4", "#b8500f", "#2a7f63", "#7a4fa3", "#8c6d1e", "#a23b73", "#3d6f8f", "#5b6771",
 )  # fmt: skip
 
+PALE: Final = 0.5  # opacity of what was before: told from what is after in grey print too
+
 VARIABLES: Final[dict[str, str]] = {
     INK: "--ink", MUTED: "--muted", GRID: "--grid", SURFACE: "--surface", LINE: "--line",
     GOOD: "--good", BAD: "--bad", WARN: "--warn", SHADE: "--shade",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 from xml.etree import ElementTree
 
 from syncline_design.machine.quick_dataclass import dataclass
@@ -16,6 +17,8 @@ from syncline_design.report.verdict_words import waiver_text
 from syncline_design.studies.finished import CaseResult
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.table import reason
+
+_FOUND: Final = {"indeterminate": "no verdict", "spec": "cannot be as combined"}  # else missed
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +86,9 @@ def _finding(result: StudyResult, tally: _Tally, total: int) -> Notice:
     level: Level = "waived" if miss.waiver else "warning"
     if result.verdict != "meets" and not miss.waiver:
         level = "undecided" if miss.rule == "indeterminate" else "fail"
+    found = _FOUND.get(miss.rule, "missed")
     message = (
-        f"missed in {tally.count} of {total} cases of the study {result.study.name}; first at "
+        f"{found} in {tally.count} of {total} cases of the study {result.study.name}; first at "
         f"{setting_text(tally.first)}: {miss.message}"
     )
     place = (miss.line or 1, miss.column or 1)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Final
 
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
-from syncline_design.report.table import CORNER, Cell, Table, table
+from syncline_design.report.table import CORNER, Cell, Table, Tone, table
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import expired_text, kind_text, waiver_text
 from syncline_design.report.words import OUTCOMES, VERBS
@@ -16,6 +17,7 @@ from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (
+    CellWord,
     HeatMap,
     StudySummary,
     boundaries,
@@ -30,6 +32,12 @@ MOST_DOWN = 20  # of tables on the console
 MOST_KEYS = 3  # columns of their own for what varies; of more, one column names them all
 LEAST_COST = "Least cost of a payload that meets the requirements"
 _NAMED: Final = re.compile(r"([\w.]+)\[([^\]\d][^\]]*)\]\.(.+)")  # by its name, not by a number
+WAIVED_SIGN: Final = "\N{CIRCLE WITH LEFT HALF BLACK}"
+UNPRICED: Final[Mapping[CellWord, tuple[str, Tone, str]]] = {  # text, tone, sign
+    "none": ("none", "bad", "\u2717"),
+    "undecided": ("not known", "warn", "?"),
+    "refused": ("cannot be", "muted", "\N{EN DASH}"),
+}
 _COMBINED = "cannot be as combined"  # a case that is refused
 _WHEN = {
     "all": "every case meets its requirements",
@@ -140,46 +148,70 @@ def currency_sentence(summary: StudySummary) -> str:
 
 def heat_table(heat: HeatMap) -> Table:
     """Least cost over two factors as a table: across and down, or a row per cell where too wide."""
-    across, down, costs = short_key(heat.x), short_key(heat.y), heat.least_cost
-    names, sides = heat.x_values, heat.y_values
+    across, down = short_key(heat.x), short_key(heat.y)
+    names, sides, cells = heat.x_values, heat.y_values, _cost_cells(heat)
     if len(names) > MOST_ACROSS and len(sides) <= MOST_ACROSS:
         across, down, names, sides = down, across, sides, names
-        costs = tuple(zip(*heat.least_cost, strict=True))
+        cells = [list(column) for column in zip(*cells, strict=True)]
     if len(names) > MOST_ACROSS:
         return _cell_table(heat)
     heads = [f"{down}{CORNER}{across}", *(f"{text} #" for text in names)]
-    rows = [
-        [Cell(name), *(_cost_cell(cost, heat.currency) for cost in line)]
-        for name, line in zip(sides, costs, strict=True)
-    ]
-    return table(LEAST_COST, heads, rows, _undecided_note(heat))
+    rows = [[Cell(name), *line] for name, line in zip(sides, cells, strict=True)]
+    return table(LEAST_COST, heads, rows, cell_notes(heat))
 
 
-def _undecided_note(heat: HeatMap) -> str:
-    """Cells without a cost in which a case got no verdict: not the same as none that meets."""
-    return f"In {heat.undecided} cells a case got no verdict." if heat.undecided else ""
+def cell_notes(heat: HeatMap) -> str:
+    """What the signs in cells say, where there are any."""
+    words = {word for line in heat.cells or () for word in line}
+    told = []
+    if "waived" in words:
+        told.append(f"{WAIVED_SIGN}: with a waived requirement missed.")
+    if "refused" in words:
+        told.append("\N{EN DASH}: cannot be as combined.")
+    if heat.undecided:
+        many = "cell" if heat.undecided == 1 else "cells"
+        told.append(f"In {heat.undecided} {many} a case got no verdict: what costs less may meet.")
+    return " ".join(told)
 
 
 def _cell_table(heat: HeatMap) -> Table:
     """The cells of a large map that a payload meets, a row each."""
     rows = [
-        [Cell(y), Cell(x), _cost_cell(cost, heat.currency), Cell(picks)]
-        for y, costs, payloads in zip(heat.y_values, heat.least_cost, heat.payload, strict=True)
-        for x, cost, picks in zip(heat.x_values, costs, payloads, strict=True)
-        if cost is not None
+        [Cell(y), Cell(x), cell, Cell(picks)]
+        for y, cells, payloads in zip(heat.y_values, _cost_cells(heat), heat.payload, strict=True)
+        for x, cell, picks in zip(heat.x_values, cells, payloads, strict=True)
+        if cell.sort is not None
     ]
     left = len(heat.x_values) * len(heat.y_values) - len(rows)
     more = max(0, len(rows) - MOST_ROWS)
     note = f"In {left} cells no case meets." if left else ""
     note += f" {more} further rows are left out." if more else ""
-    note += f" {_undecided_note(heat)}"
+    note += f" {cell_notes(heat)}"
     heads = (short_key(heat.y), short_key(heat.x), "Least cost #", "Payload")
     return table(LEAST_COST, heads, rows[:MOST_ROWS], note.strip())
 
 
-def _cost_cell(cost: float | None, currency: str) -> Cell:
+def cell_word(heat: HeatMap, x: int, y: int) -> CellWord:
+    """What is known of a cell; of a file without these words, by its cost."""
+    if heat.cells is not None:
+        return heat.cells[y][x]
+    return "none" if heat.least_cost[y][x] is None else "meets"
+
+
+def _cost_cells(heat: HeatMap) -> list[list[Cell]]:
+    """A cell for each of the map."""
+    return [
+        [_cost_cell(cost, cell_word(heat, x, y), heat.currency) for x, cost in enumerate(line)]
+        for y, line in enumerate(heat.least_cost)
+    ]
+
+
+def _cost_cell(cost: float | None, word: CellWord, currency: str) -> Cell:
     if cost is None:
-        return Cell("none", tone="bad", mark="\u2717")
+        text, tone, sign = UNPRICED[word]
+        return Cell(text, tone=tone, mark=sign)
+    if word == "waived":
+        return Cell(numbers.money(cost, currency), cost, "warn", WAIVED_SIGN)
     return Cell(numbers.money(cost, currency), cost)
 
 
@@ -227,18 +259,23 @@ def _where_cells(
 
 
 def misses_table(summary: StudySummary) -> Table:
-    """Which requirements designs fail, in how many cases and where."""
+    """Which requirements cases miss, or cannot meet together; in how many, and where."""
     several = [short_key(factor.key) for _, factor in varied(summary)]
     rows = []
     for one in misses(summary, shown_value):
         row = summary.missed[one.requirement]
         rows.append([
             Cell(one.requirement), Cell(kind_text(row)),
-            Cell(f"{one.cases} of {one.of}", float(one.cases)), Cell(waiver_text(row)),
+            Cell(f"{numbers.count(one.cases)} of {numbers.count(len(summary.briefs))}",
+                 float(one.cases)),
+            Cell(numbers.count(one.waived) if one.waived else "", float(one.waived)),
+            Cell(waiver_text(row)),
             *_where_cells(several, one.where),
         ])  # fmt: skip
-    heads = ["Requirement", "Limits", "Fails in #", "Waiver", *_at(several)]
-    return table("Which requirements fail", heads, rows)
+    heads = ["Requirement", "Limits", "Fails in #", "Waived in #", "Waiver", *_at(several)]
+    together = any(brief.verdict == "infeasible" and brief.failing for brief in summary.briefs)
+    note = "Of an infeasible case those that no design meets together." if together else ""
+    return table("Which requirements fail", heads, rows, note)
 
 
 def boundary_table(summary: StudySummary, most: int = MOST_ROWS) -> Table:

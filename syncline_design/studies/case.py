@@ -161,7 +161,7 @@ def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Ca
 
 
 def _problem(problem: Flaw) -> FileProblem:
-    message = str(problem).partition(": ")[2]
+    message = str(problem).partition(": ")[2].removeprefix(f"{problem.path}: ")
     return FileProblem(problem.file, problem.line, problem.column, problem.path, message)
 
 

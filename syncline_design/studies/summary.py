@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
@@ -17,6 +17,7 @@ from syncline_design.verdict.tree import RequirementResult
 MOST_FRONTS = 500
 MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
 
+CellWord = Literal["meets", "waived", "none", "undecided", "refused"]
 Shown = Callable[[Factor, str], str]  # a value of a factor as it is to be written
 
 
@@ -55,7 +56,7 @@ class StudySummary:
     """Every case in a line, and the fronts that differ.
 
     accuracy: the first case's, in the unit of whose limit a page tells errors.  missed: by id, what
-    some design fails, as the first that does.
+    some case misses, as the first that does.
     """
 
     result: Finished
@@ -75,7 +76,8 @@ class StudySummary:
 class HeatMap(Record):
     """Least cost of a meeting case over two factors [y][x]; None where no case meets.
 
-    payload: of that case.  undecided: cells without a cost in which a case got no verdict.
+    payload: of that case.  cells: what is known of each [y][x].  undecided: cells in which a case
+    got no verdict, also such as have a cost.
     """
 
     x: str
@@ -86,6 +88,7 @@ class HeatMap(Record):
     least_cost: tuple[tuple[float | None, ...], ...]
     payload: tuple[tuple[str, ...], ...]
     undecided: int | None = optional()
+    cells: tuple[tuple[CellWord, ...], ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,11 +105,14 @@ class Winner(RolePick):
 
 @dataclass(frozen=True, slots=True)
 class Miss(Record):
-    """One requirement that designs fail: in how many of how many cases with one, and where."""
+    """One requirement that cases miss, or cannot meet together with others: in how many, and where.
+
+    waived: cases of these that meet all the same.
+    """
 
     requirement: str
     cases: int
-    of: int
+    waived: int
     where: tuple[str, ...]
 
 
@@ -132,7 +138,7 @@ def summarise(result: Finished) -> StudySummary:
     missed: dict[str, RequirementResult] = {}
     for case in result.cases():
         briefs.append(_brief(case))
-        for row in case.record.requirements if case.record.design is not None else ():
+        for row in case.record.requirements:
             if row.status == "fail":
                 missed.setdefault(row.id, row)
         asked = (row for row in case.record.requirements if row.kind == "accuracy")
@@ -156,9 +162,8 @@ def _brief(case: CaseResult) -> Brief:
 
 
 def _failing(record: CaseRecord) -> tuple[str, ...]:
-    """What its design fails; without one its requirements are no more than in conflict."""
-    rows = record.requirements if record.design is not None else ()
-    return tuple(row.id for row in rows if row.status == "fail")
+    """What its design fails, or what no design meets together."""
+    return tuple(row.id for row in record.requirements if row.status == "fail")
 
 
 def varied(summary: StudySummary) -> list[tuple[int, Factor]]:
@@ -207,19 +212,28 @@ def _filled(summary: StudySummary, x: Factor, y: Factor) -> HeatMap:
             held = best.get(cell)
             if held is None or brief.cost < (held.cost or 0.0):
                 best[cell] = brief
-    open_cells = {
-        (brief.labels[across], brief.labels[up])
-        for brief in summary.briefs
-        if brief.verdict == "indeterminate"
-    }
+    words: dict[tuple[str, str], set[CaseWord]] = {}
+    for brief in summary.briefs:
+        words.setdefault((brief.labels[across], brief.labels[up]), set()).add(brief.verdict)
     columns, rows = x.axis, y.axis
     found = [[best.get((column, row)) for column in columns] for row in rows]
     return HeatMap(
         x.key, y.key, summary.currencies[0], columns, rows,
         tuple(tuple(None if b is None else b.cost for b in row) for row in found),
         tuple(tuple("" if b is None else payload(b) for b in row) for row in found),
-        len(open_cells - set(best)) or None,
+        sum("indeterminate" in one for one in words.values()) or None,
+        tuple(tuple(_cell_word(best.get((column, row)), words[column, row]) for column in columns)
+              for row in rows),
     )  # fmt: skip
+
+
+def _cell_word(best: Brief | None, words: set[CaseWord]) -> CellWord:
+    """What is known of a cell: words of its cases; best: the cheapest that meets."""
+    if best is not None:
+        return "waived" if best.waived else "meets"
+    if "indeterminate" in words:
+        return "undecided"
+    return "refused" if words == {"refused"} else "none"
 
 
 def payload(brief: Brief) -> str:
@@ -256,14 +270,14 @@ def _winner(
 
 
 def misses(summary: StudySummary, show: Shown = lambda _, label: label) -> list[Miss]:
-    """Requirements that designs fail, most frequent first."""
-    designed = [brief for brief in summary.briefs if brief.picks]
+    """Requirements that cases miss, most frequent first."""
     several = varied(summary)
     found = []
     for name in summary.missed:
-        failing = [brief for brief in designed if name in brief.failing]
+        failing = [brief for brief in summary.briefs if name in brief.failing]
         where = tuple(_extent(one, {b.labels[i] for b in failing}, show) for i, one in several)
-        found.append(Miss(name, len(failing), len(designed), where))
+        waived = sum(name in brief.waived for brief in failing)
+        found.append(Miss(name, len(failing), waived, where))
     return sorted(found, key=lambda one: -one.cases)
 
 

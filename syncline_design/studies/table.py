@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.unit_table import SI_UNITS
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.finished import CaseResult, Finished
@@ -105,7 +106,16 @@ def reason(case: CaseResult) -> str:
         return "; ".join(f"{problem.path}: {problem.message}" for problem in record.problems)
     why = record.infeasibility
     if why is None:
-        return ""
+        return _undecided(record) if record.verdict == "indeterminate" else ""
     fixes = [fix.text for fix in why.fixes]
-    would = f" Either would do: {'; '.join(fixes)}." if fixes else ""
+    lead = "This" if len(fixes) == 1 else "Either" if len(fixes) == 2 else "Any one of these"
+    would = f" {lead} would do: {'; '.join(fixes)}." if fixes else ""
     return obstacle_sentence(why) + would
+
+
+def _undecided(record: CaseRecord) -> str:
+    """Why there is no verdict, where nothing went wrong."""
+    if record.provisional:
+        return "its time limit was over before the choice was proven"
+    ids = [row.id for row in record.requirements if row.status == "indeterminate"]
+    return f"{sentence_list(ids)} undecided" if ids else ""
