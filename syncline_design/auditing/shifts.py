@@ -89,15 +89,10 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
 def _joined(
     jumps: tuple[StampFault, ...], slow: tuple[StampFault, ...], near_s: float
 ) -> tuple[StampFault, ...]:
-    """Both, but for what the size of a step beside, or the course of a lock, was off by; and but
-    for a jump that levels take back where it is: no clock moved."""
+    """Both, but for what the size of a step beside, or the course of a lock, was off by."""
     kept = list(jumps)
     rest: list[StampFault] = []
     for fault in slow:
-        back = next((one for one in kept if _takes_back(fault, one, near_s)), None)
-        if back is not None:
-            kept.remove(back)
-            continue
         k = next((k for k, one in enumerate(kept) if _is_rest(fault, one, near_s)), None)
         if k is not None:
             size = float(kept[k].parameters["seconds"]) + float(fault.parameters["seconds"])
@@ -105,18 +100,6 @@ def _joined(
         elif not any(_is_rest(fault, one, near_s) for one in slow if one.fault == "relock"):
             rest.append(fault)
     return (*kept, *rest)
-
-
-def _takes_back(fault: StampFault, jump: StampFault, near_s: float) -> bool:
-    """Whether a step from the levels is one of the stamps' rhythm the other way round."""
-    if {fault.fault, jump.fault} != {"step"} or "interval_s" in jump.parameters:
-        return False
-    assert fault.from_s is not None
-    assert jump.from_s is not None
-    size = float(jump.parameters["seconds"])
-    ends = abs(float(fault.to_s or 0.0) - float(jump.to_s or 0.0)) <= near_s
-    together = abs(size + float(fault.parameters["seconds"])) < _REST * abs(size)
-    return ends and together and abs(fault.from_s - jump.from_s) <= near_s
 
 
 def _is_rest(fault: StampFault, larger: StampFault, near_s: float) -> bool:

@@ -7,12 +7,14 @@ from typing import Final
 
 from syncline_design.comparison.acceptance import (
     Acceptance,
+    AssumptionName,
     AssumptionResult,
     AssumptionStatus,
     MeasuredFigure,
     OneOfThese,
     SuspectedWay,
 )
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.ci import Level, Notice
 from syncline_design.report.columns import alike
@@ -34,6 +36,7 @@ from syncline_design.report.sarif import sarif_log
 from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.verdict_words import pinned_by
 
+DEPARTING: Final[tuple[AssumptionName, ...]] = ("latency", "lever_arm", "mounting")
 _OUTCOMES: Final[dict[AssumptionStatus, tuple[Tone, str, str]]] = {
     "holds": ("good", "\u2713", "holds"),
     "broken": ("bad", "\u2717", "broken"),
@@ -183,7 +186,10 @@ def assumptions_table(assumptions: Sequence[AssumptionResult]) -> Table:
         "Measured (95 %) #",
         "Evidence",
     )
-    return table("Assumptions", heads, rows, named_by=1)
+    departing = {row.assumption for row in assumptions} & set(DEPARTING)
+    names = [one.replace("_", " ") for one in DEPARTING if one in departing]
+    note = f"Of {sentence_list(names)}: what departs from the spec." if names else ""
+    return table("Assumptions", heads, rows, note, named_by=1)
 
 
 def _first_told(row: AssumptionResult) -> tuple[int, int]:
