@@ -114,7 +114,7 @@ def test_several_bases_are_told_apart_where_their_least_is_shown(tmp_path: Path)
     )
     study = write(tmp_path, STUDY.replace("[spec.yaml]", "[spec.yaml, dear.yaml]"), PINNED)
     shown = " ".join(console(on_study(run_study(study)), colour=False).split())
-    assert "Of several bases the one that costs least is shown." in shown
+    assert "Of all values of base the case that costs least." in shown
     assert "Dear (none of 6 meets)" in shown
 
 

@@ -47,6 +47,7 @@ from syncline_design.studies.result import StudyResult
 from syncline_design.studies.scatter import Scatter, scatter
 from syncline_design.studies.summary import (
     Brief,
+    HeatMap,
     StudyFront,
     StudySummary,
     heat_map,
@@ -103,8 +104,7 @@ def _heat(summary: StudySummary) -> list[Node]:
         "A cross: computed, and no case is known to meet."
     )
     caption = f"{caption} {cell_notes(heat)}".strip()
-    if len(summary.result.study.bases) > 1:
-        least = "Of several bases the one that costs least is shown."
+    if least := _collapsed(summary, heat):
         caption, shown = f"{caption} {least}", replace(shown, note=f"{shown.note} {least}".strip())
     short = show(shown, silent=True, reach="text")
     whole = show(shown, silent=True, reach="page")
@@ -113,6 +113,14 @@ def _heat(summary: StudySummary) -> list[Node]:
         short = [Text(f"Over {size}: see the page or the CSV table.", reach="text")]
         whole = [Group(tuple(whole), "fold", summary=f"As a table, {size}", reach="page")]
     return [Chart("heat", lambda: charts_study.cost_map(heat), caption), *whole, *short]
+
+
+def _collapsed(summary: StudySummary, heat: HeatMap) -> str:
+    """What varies besides the two factors of a map, of which a cell has the cheapest."""
+    others = [short_key(f.key) for _, f in varied(summary) if f.key not in (heat.x, heat.y)]
+    if len(summary.result.study.bases) > 1:
+        others.insert(0, "base")
+    return f"Of all values of {sentence_list(others)} the case that costs least." if others else ""
 
 
 def _sampled(summary: StudySummary) -> list[Node]:
@@ -161,7 +169,9 @@ def _fronts(summary: StudySummary) -> list[Node]:
     if len({front.currency for front in chosen}) == 1:
         named = [charts_study.NamedFront(_name(summary, f)[0], f.points) for f in chosen]
         draw = partial(charts_study.fronts, named, chosen[0].currency, summary.accuracy)
-        caption = "At most eight fronts are drawn; the table has all that differ."
+        caption = "Exact fronts: what each accuracy costs."
+        if len(summary.fronts) > MOST_FRONTS:
+            caption = "Eight of the fronts are drawn; the table has all that differ."
         nodes.append(Chart("fronts", draw, caption))
     return [*nodes, *show(_fronts_table(summary), silent=True, reach="page")]
 

@@ -103,7 +103,10 @@ def _values_of(factor: Factor) -> str:
 def outcome(result: StudyResult) -> Outcome:
     """The study's outcome as colour, symbol and word."""
     shown = OUTCOMES[result.verdict]
-    return Outcome(shown.tone, shown.mark, count_sentence(result) + expired_text(result.lapsed))
+    words = count_sentence(result) + expired_text(result.lapsed)
+    if result.lapsed and shown.tone == "good":
+        return Outcome("warn", "!", words)  # a study may pass whose cases miss what was waived
+    return Outcome(shown.tone, shown.mark, words)
 
 
 def count_sentence(result: StudyResult) -> str:
