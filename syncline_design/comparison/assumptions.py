@@ -18,6 +18,7 @@ from syncline_design.verdict.tree import Verdict
 _MOUNTED: Final[dict[str, tuple[AssumptionName, ...]]] = {
     "position": ("lever_arm",), "attitude": ("mounting",), "ranging": ("lever_arm", "mounting"),
 }  # fmt: skip
+DEPARTING: Final[tuple[AssumptionName, ...]] = ("latency", "lever_arm", "mounting")  # from the spec
 _UNITS: Final[dict[AssumptionName, str]] = {
     "timing": "s", "latency": "s", "lever_arm": "m", "mounting": "rad", "noise": "1",
     "clock": "s", "speed": "m/s", "rate": "rad/s",

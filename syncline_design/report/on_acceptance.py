@@ -7,13 +7,13 @@ from typing import Final
 
 from syncline_design.comparison.acceptance import (
     Acceptance,
-    AssumptionName,
     AssumptionResult,
     AssumptionStatus,
     MeasuredFigure,
     OneOfThese,
     SuspectedWay,
 )
+from syncline_design.comparison.assumptions import DEPARTING
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.ci import Level, Notice
@@ -36,7 +36,6 @@ from syncline_design.report.sarif import sarif_log
 from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.verdict_words import pinned_by
 
-DEPARTING: Final[tuple[AssumptionName, ...]] = ("latency", "lever_arm", "mounting")
 _OUTCOMES: Final[dict[AssumptionStatus, tuple[Tone, str, str]]] = {
     "holds": ("good", "\u2713", "holds"),
     "broken": ("bad", "\u2717", "broken"),
