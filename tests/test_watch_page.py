@@ -97,6 +97,7 @@ def test_no_power_of_ten_stands_for_a_unit_in_words() -> None:
     runs = [cast(WatchedRun, SimpleNamespace(run=k, values=v)) for k, v in enumerate(values, 1)]
     drawn = courses(runs, [("tilt", "attitude", "usv", "gain")], {})
     says = drawn.told[0].says
+    assert says["Parameter"] == "gain"
     told = [says[label].replace("\u2212", "-") for label in ("Value", "95 % interval")]
     assert told == ["0.00013", "-0.00036 to 0.00062"]
 

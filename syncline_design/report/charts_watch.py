@@ -98,6 +98,7 @@ def _panel(
         value, *ends = (numbers.places(x / size, decimals) for x in (v.value, low, high))
         tell(axes, place, v.value / scale, [
             ("Run", str(runs[place].run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
+            ("Parameter", (key[3].rpartition("_")[0] or key[3]).replace("_", " ")),
             ("Value", f"{value} {named}".strip()),
             ("95 % interval", " to ".join(f"{end} {named}".strip() for end in ends)),
         ])  # fmt: skip
