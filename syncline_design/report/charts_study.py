@@ -14,7 +14,13 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, GRID, INK, MUTED, SERIES, SURFACE, WARN
-from syncline_design.report.study_words import UNPRICED, WAIVED_SIGN, cell_word, short_key
+from syncline_design.report.study_words import (
+    COMBINED,
+    UNPRICED,
+    WAIVED_SIGN,
+    cell_word,
+    short_key,
+)
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 from syncline_design.report.words import BRIEF
@@ -33,7 +39,7 @@ MOST_PATCHES = 5  # of a scale of prices
 _UNPRICED = {
     "none": "no case is known to meet",
     "undecided": "not known: a case got no verdict",
-    "refused": "cannot be as combined",
+    "refused": COMBINED,
 }
 _WAIVED = ", with a waived requirement missed"
 MOST_LABEL = 44  # characters of a front's in a legend
@@ -203,7 +209,7 @@ STEP = 0.06  # of opacity: finer nobody sees
 _VERDICTS = (  # verdicts, marker, colour, word
     (("fails", "infeasible"), "x", BAD, BRIEF["fails"].word),
     (("indeterminate",), "^", WARN, BRIEF["indeterminate"].word),
-    (("refused",), "+", MUTED, "cannot be as combined"),
+    (("refused",), "+", MUTED, COMBINED),
 )
 
 

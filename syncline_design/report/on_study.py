@@ -249,11 +249,8 @@ def _sampled_caption(data: Scatter) -> str:
         "Computed cases only. A filled mark meets its requirements, the stronger its colour the "
         "dearer; a cross does not."
     )
-    return text + (
-        f" Vary besides: {sentence_list([short_key(key) for key in data.others])}."
-        if data.others
-        else ""
-    )
+    others = [short_key(key) for key in data.others]
+    return text + (f" Vary besides: {sentence_list(others)}." if others else "")
 
 
 def _case_table(summary: StudySummary) -> Table:
@@ -274,11 +271,8 @@ def _case_table(summary: StudySummary) -> Table:
             Cell(numbers.error(brief.error_m, limit), brief.error_m),
             Cell(why),
         ])  # fmt: skip
-    keys = (
-        [short_key(factor.key) for _, factor in several]
-        if len(several) <= MOST_KEYS
-        else ["Setting"]
-    )
+    few = len(several) <= MOST_KEYS
+    keys = [short_key(factor.key) for _, factor in several] if few else ["Setting"]
     varying = [*(["Base"] if many else []), *keys]
     ends = ["Verdict", "Price #", "Syncline error #", "Payload, or why there is none"]
     heads = ["Case #", *varying, *ends]

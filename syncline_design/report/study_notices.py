@@ -11,14 +11,14 @@ from syncline_design.machine.sentences import sentence_list
 from syncline_design.report.ci import Level, Notice, requirement_sentence
 from syncline_design.report.github import github_command
 from syncline_design.report.sarif import sarif_log
-from syncline_design.report.study_words import outcome, rule_sentence
+from syncline_design.report.study_words import COMBINED, outcome, rule_sentence
 from syncline_design.report.text import unticked, visible
 from syncline_design.report.verdict_words import waiver_text
 from syncline_design.studies.finished import CaseResult
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.table import reason
 
-_FOUND: Final = {"indeterminate": "no verdict", "spec": "cannot be as combined"}  # else missed
+_FOUND: Final = {"indeterminate": "no verdict", "spec": COMBINED}  # else missed
 
 
 @dataclass(frozen=True, slots=True)

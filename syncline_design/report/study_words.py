@@ -38,7 +38,7 @@ UNPRICED: Final[Mapping[CellWord, tuple[str, Tone, str]]] = {  # text, tone, sig
     "undecided": ("not known", "warn", "?"),
     "refused": ("cannot be", "muted", "\N{EN DASH}"),
 }
-_COMBINED = "cannot be as combined"  # a case that is refused
+COMBINED = "cannot be as combined"  # a case that is refused
 _WHEN = {
     "all": "every case meets its requirements",
     "any": "at least one case meets its requirements",
@@ -69,15 +69,8 @@ def varied_table(summary: StudySummary) -> Table:
     ]  # fmt: skip
     bases = summary.result.study.bases
     if len(bases) > 1:
-        rows.insert(
-            0,
-            [
-                Cell("base"),
-                Cell("base", code=True),
-                Cell(str(len(bases)), float(len(bases))),
-                Cell(_bases(summary)),
-            ],
-        )
+        count = Cell(str(len(bases)), float(len(bases)))
+        rows.insert(0, [Cell("base"), Cell("base", code=True), count, Cell(_bases(summary))])
     return table("What varies", ["Name", "In the spec", "Values #", "Which"], rows)
 
 
@@ -103,15 +96,15 @@ def _values_of(factor: Factor) -> str:
 def outcome(result: StudyResult) -> Outcome:
     """The study's outcome as colour, symbol and word."""
     shown = OUTCOMES[result.verdict]
-    words = count_sentence(result) + expired_text(result.lapsed)
-    if result.lapsed and shown.tone == "good":
+    words = count_sentence(result) + expired_text(result.expired_waivers)
+    if result.expired_waivers and shown.tone == "good":
         return Outcome("warn", "!", words)  # a study may pass whose cases miss what was waived
     return Outcome(shown.tone, shown.mark, words)
 
 
 def count_sentence(result: StudyResult) -> str:
     """`13 of 25 cases meet their requirements, 12 are infeasible`."""
-    verbs = VERBS | {"refused": (_COMBINED, _COMBINED)}
+    verbs = VERBS | {"refused": (COMBINED, COMBINED)}
     counts = result.counts
     met, every = numbers.count(counts["meets"]), numbers.count(len(result))
     parts = [f"{met} of {every} cases {verbs['meets'][counts['meets'] != 1]}"]
@@ -170,7 +163,7 @@ def cell_notes(heat: HeatMap) -> str:
     if "waived" in words:
         told.append(f"{WAIVED_SIGN}: with a waived requirement missed.")
     if "refused" in words:
-        told.append("\N{EN DASH}: cannot be as combined.")
+        told.append(f"\N{EN DASH}: {COMBINED}.")
     if heat.undecided:
         many = "cell" if heat.undecided == 1 else "cells"
         told.append(f"In {heat.undecided} {many} a case got no verdict: what costs less may meet.")

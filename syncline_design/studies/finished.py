@@ -50,7 +50,7 @@ class _End:
     verdict: CaseWord
     not_simulated: tuple[str, ...]
     waived: bool
-    lapsed: tuple[str, ...]
+    expired_waivers: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ class Finished:
         """How often cases ended how: every record read once."""
         records = map(self._record, range(len(self.keys)))
         return Counter(
-            _End(one.verdict, one.not_simulated, bool(one.waived), one.lapsed) for one in records
+            _End(one.verdict, one.not_simulated, bool(one.waived), one.expired_waivers)
+            for one in records
         )
 
     @cached_property
@@ -111,9 +112,9 @@ class Finished:
         return sum(count for end, count in self._ends.items() if end.waived)
 
     @property
-    def lapsed(self) -> tuple[str, ...]:
+    def expired_waivers(self) -> tuple[str, ...]:
         """Requirements that some case misses and whose waiver is over."""
-        return tuple(sorted({i for end in self._ends for i in end.lapsed}))
+        return tuple(sorted({i for end in self._ends for i in end.expired_waivers}))
 
     @property
     def not_simulated(self) -> tuple[str, ...]:

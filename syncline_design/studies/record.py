@@ -91,7 +91,7 @@ class CaseRecord(Record):
         return waived_misses(self.requirements) if self.verdict == "meets" else ()
 
     @property
-    def lapsed(self) -> tuple[str, ...]:
+    def expired_waivers(self) -> tuple[str, ...]:
         """Ids of requirements that a case misses and whose waiver is over."""
         missed = (row for row in self.requirements if row.status == "fail" and row.waiver)
         return tuple(row.id for row in missed if not row.is_waived)

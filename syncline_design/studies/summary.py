@@ -104,7 +104,7 @@ class Winner(RolePick):
 
 
 @dataclass(frozen=True, slots=True)
-class Miss(Record):
+class Miss:
     """One requirement that cases miss, or cannot meet together with others: in how many, and where.
 
     waived: cases of these that meet all the same.
