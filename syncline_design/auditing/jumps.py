@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.backlog import held_up
 from syncline_design.auditing.cadence import Cadence, at_another_rate
+from syncline_design.auditing.host_ticks import longest_tick, moved_together
 from syncline_design.auditing.lasting_jumps import Jump, lasting, of_the_clock, went_on
 from syncline_design.auditing.naming import is_whole, slipped
 from syncline_design.auditing.result import StampFault
@@ -65,12 +66,14 @@ _SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in qu
 
 @dataclass(frozen=True, slots=True)
 class Mended:
-    """The series without its jumps, and the jumps as faults.  settling_s: when others begin."""
+    """The series without its jumps, and the jumps as faults.  settling_s: when others begin;
+    hidden_s: a host's tick, by which messages were late, as if smaller steps were the stamps'."""
 
     series: Series
     faults: tuple[StampFault, ...]
     jumps: tuple[Jump, ...]
     settling_s: tuple[float, ...] = ()
+    hidden_s: float = 0.0
 
 
 def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
@@ -83,8 +86,12 @@ def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
     late = late - np.median(late)
     found = _found(pace, late, least_s)
     found = [] if len(found) > _MOST_JUMPS else of_the_clock(found, times, late, pace)
+    tick = longest_tick(series) if found else 0.0
+    own = _own(found, late, tick)
+    hidden_s = tick if len(own) < len(found) else 0.0
+    found = own
     if not found:
-        return nothing
+        return replace(nothing, hidden_s=hidden_s)
     kept = lasting(found, times, late, pace)
     settling = tuple(float(times[j.place]) for j in found if j not in kept)
     kept = [j for j in kept if not went_on(j, [s for s in found if s not in kept], pace)]
@@ -98,7 +105,17 @@ def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
         if jump.end is None:
             stamp[part[-1] + 1 :] -= round(jump.size_s * NS)
     faults = _faults(found, times, pace)
-    return Mended(replace(series, stamp=stamp), faults, tuple(found), settling)
+    return Mended(replace(series, stamp=stamp), faults, tuple(found), settling, hidden_s)
+
+
+def _own(found: list[Jump], late: Array, tick_s: float) -> list[Jump]:
+    """Those that receipts at ticks of a host do not tell to be of what is stamped."""
+    edges = [0, *(jump.place for jump in found), late.size]
+    return [
+        jump
+        for jump, a, b in zip(found, edges, edges[2:], strict=False)
+        if jump.again or not moved_together(late[a:b], jump.place - a, -jump.size_s, tick_s)
+    ]
 
 
 def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:

@@ -16,7 +16,7 @@ from syncline_design.auditing import witness
 from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
 from syncline_design.auditing.clock_shapes import Shape, course
-from syncline_design.auditing.grains import timers
+from syncline_design.auditing.host_ticks import longest_tick, moved_together, ticks_of
 from syncline_design.auditing.jumps import without_jumps
 from syncline_design.auditing.lasting_jumps import Jump
 from syncline_design.auditing.levels import SURE, believed, polished, shapes_of
@@ -31,10 +31,6 @@ from syncline_design.machine.quick_dataclass import dataclass
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
 _BEAT: Final = 1.2  # ticks
 _REST: Final = 0.025  # of a jump: how well its size is known at once
-_TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
-_OTHER_TICKS: Final = 3  # receipts that show a tick
-_MOST_OF_TICK: Final = 0.5  # that waits fill, where whole ticks are to be told from others
-_MET: Final = 0.8  # of those that missed a tick; by chance at most half
 _OTHER_RATE: Final = 0.3  # of an interval
 _CHANCE: Final = 4.0  # sigma of a mean interval, of sensors without a rhythm
 _LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
@@ -62,6 +58,7 @@ class Shifts:
     breathing_s: float = 0.0  # how far receipts move to and fro while stamps keep their rhythm
     seen: tuple[Shape, ...] = ()  # in the levels, whosever they are
     beat_s: float = 0.0  # what is slow and smaller may be a beat with a host's ticks
+    hidden_s: float = 0.0  # steps up to a host's tick that its receipts do not tell
 
 
 def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
@@ -83,7 +80,8 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     if moved.blocks is None and not faults:  # few messages
         whole, faults = without_plain_step(moved.series, cadence(series), least_s)
         moved = replace(moved, series=whole)
-    return replace(moved, faults=faults, shifts=(*own, *moved.shifts))
+    hidden_s = max(moved.hidden_s, mended.hidden_s)
+    return replace(moved, faults=faults, shifts=(*own, *moved.shifts), hidden_s=hidden_s)
 
 
 def _joined(
@@ -135,13 +133,16 @@ def _slow_shifts(
     ]
     seen = tuple(placed)
     judged = [_judged(pace, shape, time_s, blocks) for shape in placed]
+    tick = longest_tick(series) if placed else 0.0
+    hidden = any(_with_what_it_stamps(shape, time_s, late, tick) for shape, _ in judged)
+    judged = [(s, side) for s, side in judged if not hidden or abs(s.size_s) > tick]
     rest = late - course(tuple(shape for shape, _ in judged), time_s)
-    beat_s = _BEAT * _ticks_of(series, rest)
+    beat_s = _BEAT * ticks_of(series, rest)
     # what is slow may be a beat between sensor and ticks
     judged = [(s, side) for s, side in judged if side == "stamp" or abs(s.size_s) > beat_s]
     found, sides = tuple(shape for shape, _ in judged), [side for _, side in judged]
     found = polished(found, [side == "stamp" for side in sides], blocks)
-    count = witness.witness_of(series, pace, blocks)
+    count = None if hidden else witness.witness_of(series, pace, blocks)
     sides = witness.sides(count, found, sides)
     sharp = [s.kind in ("step", "episode") and witness.sharp(s, time_s, late) for s in found]
     own = _own(found, sides, sharp, time_s, blocks)
@@ -166,7 +167,15 @@ def _slow_shifts(
         for s, side, seen in zip(found, sides, sharp, strict=True) if seen or side == "stamp"
     )  # fmt: skip
     breathing = float(np.ptp(course(left, blocks.time_s))) if left else 0.0
-    return Shifts(replace(series, stamp=whole), faults, shifts, blocks, breathing, seen, beat_s)
+    put_back = replace(series, stamp=whole)
+    told_s = tick if hidden else 0.0
+    return Shifts(put_back, faults, shifts, blocks, breathing, seen, max(beat_s, told_s), told_s)
+
+
+def _with_what_it_stamps(shape: Shape, time_s: Array, late: Array, tick_s: float) -> bool:
+    """Whether receipts at ticks of a host tell that no clock made a step."""
+    place = int(np.searchsorted(time_s, shape.begin_s))
+    return shape.kind == "step" and moved_together(late, place, shape.size_s, tick_s)
 
 
 def _own(
@@ -233,56 +242,6 @@ def _change(at_s: float, size_s: float, time_s: Array, late: Array, blocks: Bloc
     value = value - value.mean()
     split = int(np.argmin(np.cumsum(value)[:-1])) + 1
     return float(time_s[a + split])
-
-
-def _ticks_of(series: Series, late: Array) -> float:
-    """The host's tick [s] where receipts keep to one, and delays are not those of transport; or 0.
-
-    A sensor whose interval is nearly a multiple of the host's tick waits a little less each time:
-    a beat, which looks like drift, of a tick at most.  An even sensor is on many grids itself; what
-    shows a tick is a receipt that comes whole ticks sooner or later than the sensor's interval.
-    Transport's delays have a tail, waits for a tick have none.
-    """
-    assert series.receive is not None
-    receive = np.sort(series.receive[series.good])
-    when = seconds(receive - receive[0])
-    kept = (t for t in timers(when) if not _has_tail(_within_tick(late, t)) and _shows(when, t))
-    return next(kept, 0.0)
-
-
-def _shows(when: Array, tick_s: float) -> bool:
-    """Whether some receipts come whole ticks sooner or later than usual."""
-    counts = np.round(np.diff(when) / tick_s)
-    values, often = np.unique(counts, return_counts=True)
-    usual = values[int(np.argmax(often))]
-    whole = counts % usual == 0.0 if usual > 0.0 else np.zeros(counts.size, bool)
-    return int(np.sum(~whole | (counts == 0.0))) >= _OTHER_TICKS
-
-
-def _within_tick(late: Array, tick_s: float) -> Array:
-    """Delays without whole ticks, where those that are longer are so by whole ticks: messages that
-    missed one, and no tail of transport."""
-    middle = np.sort(late)[late.size // 2]  # one of them: halfway between two, none may be near it
-    turns = np.round((late - middle) / tick_s)
-    folded = late - turns * tick_s
-    usual = np.percentile(folded[turns == 0.0], [1.0, 99.0])
-    missed = folded[turns != 0.0]
-    if missed.size < _OTHER_TICKS or float(np.ptp(usual)) > _MOST_OF_TICK * tick_s:
-        return late
-    met = float(np.mean((missed >= usual[0]) & (missed <= usual[1])))
-    return folded if met > _MET else late
-
-
-def _has_tail(late: Array) -> bool:
-    """Whether delays reach further above their median than below it, block by block."""
-    skews = []
-    pieces = np.array_split(late, max(4, late.size // 64))
-    for piece in pieces[:: max(1, len(pieces) // 1000)]:
-        k = np.arange(piece.size) - 0.5 * (piece.size - 1)
-        low, middle, high = np.percentile(piece - k * float(k @ piece) / float(k @ k), [5, 50, 95])
-        if high > low:
-            skews.append(((high - middle) - (middle - low)) / (high - low))
-    return bool(skews) and float(np.median(skews)) > _TAIL
 
 
 def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple[Shape, Side]:

@@ -409,7 +409,7 @@ def _smallest(moved: Shifts) -> SmallestSeen:
     length = float(blocks.time_s[-1] - blocks.time_s[0])
     if not np.isfinite(step) or length <= 0.0:
         return SmallestSeen(None, None)
-    return SmallestSeen(step, 1e6 * max(over, moved.beat_s) / length)
+    return SmallestSeen(max(step, moved.hidden_s), 1e6 * max(over, moved.beat_s) / length)
 
 
 def _offset(raw: Series, series: Series) -> float | None:
