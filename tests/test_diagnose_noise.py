@@ -67,6 +67,7 @@ def test_banded_algebra_is_the_dense_one(m: int) -> None:
     assert known.solve(many) == pytest.approx(np.tile(expected, 25), abs=1e-10)
     told = series.reshape(45, 5).T @ expected.reshape(45, 5)
     assert known.information(series) == pytest.approx(told, abs=1e-9)
+    assert known.squares(series) == pytest.approx(np.diag(told), abs=1e-9)
     assert known.information(many) == pytest.approx(np.tile(told, (25, 25)), abs=1e-9)
     error = series[:, :, 0]
     density = multivariate_normal(np.zeros(45), full).logpdf(error.ravel())
@@ -91,6 +92,7 @@ def test_many_columns_are_solved_as_each_alone(repeated: bool) -> None:
     told = np.einsum("nij,nik->jk", series, alone)
     scale = np.sqrt(np.diag(told))
     assert np.all(np.abs(known.information(series) - told) < 1e-9 * scale[:, None] * scale)
+    assert known.squares(series) == pytest.approx(np.diag(told), rel=1e-9)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7, 15])

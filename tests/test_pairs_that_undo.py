@@ -44,8 +44,8 @@ def test_nothing_stands_in_the_place_of_what_has_no_signature() -> None:
     ]
     groups = tuple(slice(k, k + 1) for k in range(3))
     scored = [(object(), Gram(np.ones(3), np.eye(3), groups, 0.0))]
-    assert in_the_place(scored, signs, ("spectral_line", "ranging", 0)) == []  # type: ignore[arg-type]
-    assert in_the_place(scored, signs, ("latency", "ranging", 0))  # type: ignore[arg-type]
+    assert in_the_place(scored, signs, ("spectral_line", "ranging", 0), lambda _: 0.0) == []  # type: ignore[arg-type]
+    assert in_the_place(scored, signs, ("latency", "ranging", 0), lambda _: 0.0)  # type: ignore[arg-type]
 
 
 def test_what_two_save_together_is_that_of_least_squares() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.plan import one_plan
 from syncline_design.diagnosis.candidates import Candidate, Signature
-from syncline_design.diagnosis.pairs import in_the_place
+from syncline_design.diagnosis.pairs import SLACK_NATS, SLACK_SHARE, in_the_place
 from syncline_design.diagnosis.scores import Gram
 from syncline_design.effects import registry
 
@@ -34,12 +34,19 @@ def test_two_that_do_better_than_one_are_ranked_by_least_squares() -> None:
     def left(at: list[int]) -> float:
         return float(np.linalg.lstsq(columns[:, at], error, rcond=None)[1][0])
 
+    def free_of_charge(figures: int) -> float:
+        return 0.0
+
     level = object()
-    (found,) = in_the_place([(level, scores)], free, (*LABELS[0], 0))  # type: ignore[list-item]
+    (found,) = in_the_place([(level, scores)], free, (*LABELS[0], 0), free_of_charge)  # type: ignore[list-item]
     assert {s.candidate.label[:2] for s in found.pair} == {LABELS[1], LABELS[2]}
     assert found.more == pytest.approx(0.5 * (left([0]) - left([1, 2])), rel=1e-6)
     small = Gram(scores.score * np.array([9.0, 1.0, 1.0]), scores.normal, scores.groups, 0.0)
-    assert not in_the_place([(level, small)], free, (*LABELS[0], 0))  # type: ignore[list-item]
+    slack = max(SLACK_NATS, SLACK_SHARE * 0.5 * (float(error @ error) - left([0])))
+    for worth, there in ((found.more + slack - 0.1, True), (found.more + slack + 0.1, False)):
+        again = in_the_place([(level, scores)], free, (*LABELS[0], 0), lambda figures: worth)  # type: ignore[list-item] # noqa: B023
+        assert bool(again) is there
+    assert not in_the_place([(level, small)], free, (*LABELS[0], 0), free_of_charge)  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize("number", [74, 159])

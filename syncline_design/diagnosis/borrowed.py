@@ -66,7 +66,7 @@ def doubt_nats(first: float, second: float) -> float:
 
 
 def _squares(known: Precision, error: Array) -> float:
-    return float(np.sum(error * known.solve(error[:, :, None])[:, :, 0]))
+    return float(known.squares(error[:, :, None])[0])
 
 
 def noisier_scenes(view: Scene, rng: np.random.Generator) -> tuple[Noisier, ...]:

@@ -19,6 +19,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+from scipy.linalg.lapack import dtbtrs
 
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import Index, groups, repeated, starts, summed
@@ -145,12 +146,28 @@ class Precision:
             found -= cross.T @ self.lasting.inverse @ cross
         return found
 
+    def squares(self, series: Array) -> Array:
+        """The diagonal of Y' C^-1 Y, (c,)."""
+        weighted: Array = self.white_inverse @ series
+        found: Array = np.einsum("nic,nic->c", series, weighted)
+        if self.loading.shape[2]:
+            found -= np.sum(self._halved(self._at_stamps(weighted)) ** 2, axis=0)
+        if self.lasting is not None:
+            cross = _summed(self.lasting.weighted, series)
+            found -= np.sum(cross * (self.lasting.inverse @ cross), axis=0)
+        return found
+
+    def _halved(self, right: Array) -> Array:
+        """L^-1 R of R (k, m, c), P = L L', (k m, c)."""
+        found: Array = dtbtrs(self.factor, right.reshape(-1, right.shape[2]), uplo="L")[0]
+        return found
+
     def _explained(self, right: Array) -> Array:
         """R' P^-1 R of R (k, m, c), (c, c)."""
         if right.shape[2] < _MANY:
-            flat = right.reshape(-1, right.shape[2])
-            solved: Array = cho_solve_banded((self.factor, True), flat, check_finite=False)
-            return _summed(right, solved.reshape(right.shape))
+            half = self._halved(right)
+            product: Array = half.T @ half
+            return product
         halfway = self._forwards(right)
         return _summed(halfway.left, halfway.states)
 
@@ -242,8 +259,7 @@ class Precision:
 
     def negative_log_likelihood(self, error: Array) -> float:
         """-log N(e; 0, C) [nat], e (n, 3)."""
-        squares = float(np.sum(error * self.solve(error[:, :, None])[:, :, 0]))
-        return self.likelihood_of(squares)
+        return self.likelihood_of(float(self.squares(error[:, :, None])[0]))
 
     def likelihood_of(self, squares: float) -> float:
         """The same of an error of which e' C^-1 e is known."""
@@ -300,13 +316,15 @@ def _markov_precision(time_s: Array, time_constant_s: Array) -> tuple[Array, flo
     g_{i-1} + phi_i^2 g_i (1 + phi_0^2 g_0 at the start) and the off-diagonal -phi_i g_i.
     """
     n, m = time_s.shape[0], time_constant_s.shape[0]
+    apart, of = np.unique(time_constant_s, return_inverse=True)  # axes often share theirs
     with np.errstate(divide="ignore"):
-        ratio = np.maximum(np.diff(time_s)[:, None] / time_constant_s, _LEAST_STEP)
+        ratio = np.maximum(np.diff(time_s)[:, None] / apart, _LEAST_STEP)
     fresh = -np.expm1(-2.0 * ratio)  # 1 - phi^2
     phi = np.exp(-ratio)
     band = np.zeros((n, m, m + 1))
     band[0, :, 0] = 1.0
-    band[1:, :, 0] = 1.0 / fresh
-    band[:-1, :, 0] += phi * phi / fresh
-    band[:-1, :, m] = -phi / fresh
-    return band.reshape(n * m, m + 1), -float(np.sum(np.log(fresh)))
+    band[1:, :, 0] = (1.0 / fresh)[:, of]
+    band[:-1, :, 0] += (phi * phi / fresh)[:, of]
+    band[:-1, :, m] = (-phi / fresh)[:, of]
+    log_det = np.sum(np.log(fresh), axis=0)
+    return band.reshape(n * m, m + 1), -float(np.sum(log_det[of]))

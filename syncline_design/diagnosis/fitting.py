@@ -280,6 +280,12 @@ def inner(first: Array, second: Array) -> Array:
     return product
 
 
+def scored(known: Precision, columns: Array, error: Array) -> tuple[Array, Array]:
+    """X' C^-1 X (p, p) and X' C^-1 e (p,), X (n, 3, p) and e (n, 3)."""
+    both = known.information(np.concatenate([columns, error[:, :, None]], axis=2))
+    return both[:-1, :-1], both[:-1, -1]
+
+
 def _stepped(
     data: Data,
     acting: tuple[Acting, ...],
@@ -302,7 +308,7 @@ def _stepped(
 
 
 def _squares(known: Precision, error: Array) -> float:
-    return float(np.sum(error * known.solve(error[:, :, None])[:, :, 0]))
+    return float(known.squares(error[:, :, None])[0])
 
 
 def _moved(acting: Sequence[Acting], change: Array) -> tuple[Acting, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.covariance import Precision
-from syncline_design.diagnosis.fitting import Data, Model, inner, solve_scaled
+from syncline_design.diagnosis.fitting import Data, Model, scored, solve_scaled
 from syncline_design.diagnosis.gap_result import Fit, Gap, HeldOut, Saved
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
@@ -172,8 +172,7 @@ def _step(known: Precision, columns: Array, error: Array) -> Array:
     """Change of the parameters that fits the rows best."""
     if columns.shape[2] == 0:
         return np.zeros(0)
-    weighted = known.solve(columns)
-    return solve_scaled(inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0])
+    return solve_scaled(*scored(known, columns, error))
 
 
 class Held:
@@ -205,8 +204,7 @@ class Held:
         return _Sums(squares, float(count), float(nll), 0.95 * count, rows, count)
 
     def _sums(self, known: Precision, variance: Array, error: Array) -> _Sums:
-        weighted = known.solve(error[:, :, None])[:, :, 0]
-        chi2 = float(np.sum(error * weighted))
+        chi2 = float(known.squares(error[:, :, None])[0])
         nll = 0.5 * (chi2 + known.log_determinant + error.size * np.log(2.0 * np.pi))
         inside = np.abs(error) < NORMAL_95 * np.sqrt(variance)
         return _Sums(

@@ -20,7 +20,7 @@ from syncline_design.diagnosis.candidates import (
     slopes,
 )
 from syncline_design.diagnosis.charges import Charge, charge, fitted_figures
-from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
+from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled, scored
 from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.spans import cut_to, cuttable, span_of
 from syncline_design.diagnosis.trials import plausible, plausible_in_place, with_effect
@@ -226,9 +226,7 @@ def _screened(
     added = (own @ values)[:, :, None]
     free = [s for s in others if s.candidate.label not in model.labels]
     columns = np.concatenate([base, added, *(np.nan_to_num(s.columns) for s in free)], axis=2)
-    weighted = model.precision.solve(columns)
-    normal = inner(columns, weighted)
-    score = inner(weighted, (model.error + added[:, :, 0])[:, :, None])[:, 0]
+    normal, score = scored(model.precision, columns, model.error + added[:, :, 0])
     normal, score = _without(normal, score, base.shape[2])
     best: dict[Label, Alias] = {}
     found: dict[Label, Signature] = {}
@@ -277,7 +275,7 @@ def unseen(data: Data, model: Model, others: Sequence[Signature]) -> tuple[str, 
         if not s.plain:
             continue
         columns = np.nan_to_num(s.columns)
-        own = np.sqrt(np.maximum(np.diag(inner(columns, model.precision.solve(columns))), 0.0))
+        own = np.sqrt(np.maximum(model.precision.squares(columns), 0.0))
         slopes_of = s.candidate.effect.slopes()
         names = [p.name for k, p in enumerate(slopes_of) if p.high * own[k] < 3.0]
         if names:

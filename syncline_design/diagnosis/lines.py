@@ -18,7 +18,7 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Candidate, Signature, slopes
 from syncline_design.diagnosis.consequence import expected_rms_m, rms_m
 from syncline_design.diagnosis.expected_noise import channels
-from syncline_design.diagnosis.fitting import Data, Model, inner, solve_scaled, thinned
+from syncline_design.diagnosis.fitting import Data, Model, inner, scored, solve_scaled, thinned
 from syncline_design.diagnosis.followed import heading_is_noise
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import (
@@ -148,9 +148,8 @@ def best_wave(data: Data, model: Model) -> Signature | None:
     _, wave, limit = max(found, key=lambda one: one[0])
     candidate = Candidate(wave.effect, wave.sensor, wave.stage)
     columns = _columns(data, candidate)
-    weighted = model.precision.solve(columns)
-    score = inner(weighted, model.error[:, :, None])[:, 0]
-    values = solve_scaled(inner(columns, weighted), score)
+    normal, score = scored(model.precision, columns, model.error)
+    values = solve_scaled(normal, score)
     if 0.5 * float(score @ values) < limit:  # neighbours may be still by chance, too
         return None
     if rms_m(data, columns @ values) < LEAST_SHARE * expected_rms_m(data):
@@ -237,7 +236,7 @@ def _in_heading(data: Data, model: Model, left: Array) -> Iterator[tuple[float, 
             wave = Wave("heading", float(harmonic), sensor, stage, k)
             columns = _columns(data, Candidate(wave.effect, sensor, stage))
             score = inner(columns, left[:, :, None])[:, 0]
-            normal = inner(columns, model.precision.solve(columns))
+            normal = model.precision.information(columns)
             energy = 0.5 * float(score @ solve_scaled(normal, score))
             if energy > limit:
                 yield energy, wave, limit

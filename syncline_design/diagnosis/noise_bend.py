@@ -22,8 +22,7 @@ NEAR = 1e-4  # of one, within which a ratio is taken for it
 
 def average_information(known: Precision, moved: Array) -> Array:
     """AI (p, p), of q (n, 3, p)."""
-    flat = moved.reshape(-1, moved.shape[2])
-    return 0.5 * flat.T @ known.solve(moved).reshape(flat.shape)
+    return 0.5 * known.information(moved)
 
 
 def by_times(known: Precision, found: Slopes, time_s: Array, constants_s: Array) -> Array:

@@ -60,12 +60,14 @@ class Steps:
     @classmethod
     def of(cls, time_s: Array, constants_s: Array) -> Steps:
         """T (m,) [s]."""
-        slow = constants_s > 0.0
-        ratio = np.diff(time_s)[:, None] / np.where(slow, constants_s, 1.0)
+        apart, of = np.unique(constants_s, return_inverse=True)  # axes often share theirs
+        slow = apart > 0.0
+        ratio = np.diff(time_s)[:, None] / np.where(slow, apart, 1.0)
         ratio = np.where(slow, np.maximum(ratio, 1e-9), 50.0)
         phi, fresh = np.exp(-ratio), -np.expm1(-2.0 * ratio)
         turned = 2.0 * phi**2 * ratio / fresh**2
-        return cls(phi, fresh, turned, -(phi * ratio / fresh + phi * turned))
+        crossed = -(phi * ratio / fresh + phi * turned)
+        return cls(phi[:, of], fresh[:, of], turned[:, of], crossed[:, of])
 
 
 def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Array) -> Slopes:

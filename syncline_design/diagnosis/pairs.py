@@ -10,7 +10,7 @@ two in the place of one, each figure more costs half of log N (Schwarz 1978), as
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Final
 
@@ -70,26 +70,35 @@ def promising(
 
 
 def in_the_place(
-    scores: Sequence[tuple[NoiseLevel, Gram]], free: Sequence[Signature], label: Label
+    scores: Sequence[tuple[NoiseLevel, Gram]],
+    free: Sequence[Signature],
+    label: Label,
+    worth: Callable[[int], float],
 ) -> list[InOnesPlace]:
-    """Pairs that save about as much as the one effect of a label, or more; the best first.
+    """Pairs that may save clearly more than the one effect of a label; the best first.
 
-    scores: of all in `free`, that effect among them, where it is taken out of the model.  A wave or
-    a line of a spectrum was sought by its frequency and is not: no two departures stand for it.
+    One effect fits in its own noise no worse than in that of the two, so these gain no more on it
+    than they save there, but for the slack.  worth: what that has to be, by the figures that they
+    have more [nat].  scores: of all in `free`, that effect among them, where it is taken out of the
+    model.  A wave or a line of a spectrum was sought by its frequency and is not: no two departures
+    stand for it.
     """
     alone = [k for k, s in enumerate(free) if s.candidate.label == label]
     if not alone:
         return []
-    pairs = [one for one in _pairs(free) if all(free[k].candidate.label != label for k in one)]
+    figures = free[alone[0]].columns.shape[2]
+    others = [one for one in _pairs(free) if all(free[k].candidate.label != label for k in one)]
+    pairs = [(one, worth(_freedom(free, one) - figures)) for one in others]
     best: dict[tuple[int, int], tuple[float, NoiseLevel]] = {}
     for level, gram in scores:
         gains = gram.gains()
         own = max(gains[k][0] for k in alone)
         least = own - max(SLACK_NATS, SLACK_SHARE * own)
-        for one in pairs:
+        for one, wanted in pairs:
             found = _joint(gram, free, one)
-            if found is not None and found > least and found - own > best.get(one, (-math.inf,))[0]:
-                best[one] = found - own, level
+            more = -math.inf if found is None or found <= least + wanted else found - own
+            if more > best.get(one, (-math.inf,))[0]:
+                best[one] = more, level
     ranked = sorted(best.items(), key=lambda entry: (-entry[1][0], entry[0]))
     return [InOnesPlace((free[one[0]], free[one[1]]), level, more) for one, (more, level) in ranked]
 
@@ -97,9 +106,13 @@ def in_the_place(
 def clearly_two(data: Data, two: Model, one: Model, free: Sequence[Signature]) -> bool:
     """Whether two effects in the place of one fit better by more than their figures and luck."""
     figures = len(two.covariance) - len(one.covariance)
+    return one.nll - two.nll > clear_nats(data, free, figures)
+
+
+def clear_nats(data: Data, free: Sequence[Signature], figures: int) -> float:
+    """By how much two have to fit better than one, for so many figures that they have more."""
     each = 0.5 * math.log(max(len(data.view) * len(data.axes), 2))
-    paid = figures * each + math.log(max(len(_pairs(free)), 1))
-    return one.nll - two.nll > CLEAR_NATS + paid
+    return CLEAR_NATS + figures * each + math.log(max(len(_pairs(free)), 1))
 
 
 def _pairs(free: Sequence[Signature]) -> list[tuple[int, int]]:

@@ -135,8 +135,10 @@ def in_a_part(
         best = blocks.best(np.eye(size)[width + k], rest, 0.0)
         if best.better < NATS + math.log(STRETCHES):
             continue
+        ends = (_span_at(states, model, one, best, column, level) for level in levels)
+        spans = {(span.from_s, span.to_s): span for span in ends}  # often the same
         log_p, cut = min(
-            (_judged(states, model, one, best, column, level) for level in levels),
+            (_judged(states, model, one, span) for span in spans.values()),
             key=lambda pair: pair[0],
         )
         if log_p + math.log(STRETCHES) < limit:
@@ -158,30 +160,34 @@ def in_a_part_of_white(
     columns = [np.nan_to_num(one.columns) for one in asked]
     blocks = blocks_of(states, model, columns)
     own = blocks.free - len(asked)
-    by_level = replace(model, precision=precision(states.data.structure, level))
     found = []
     for k, (one, column) in enumerate(zip(asked, columns, strict=True)):
         best = blocks.best(np.eye(len(blocks.prior))[own + k], np.r_[0:own], 0.0)
         if best.gain < least or best.better < NATS + math.log(STRETCHES):
             continue
-        span = _span(states, by_level, one.candidate.effect, column[:, :, 0], best)
+        span = _span_at(states, model, one, best, column, level)
         found.append(cut_to(span, one, states.data.view.log.time_s))
     return found
 
 
-def _judged(
+def _span_at(
     states: States,
     model: Model,
     one: Signature,
     best: FoundPart,
     column: Array,
     level: NoiseLevel,
+) -> StampSpan:
+    """The stretch of an effect (n, 3, 1) as a noise level shows it."""
+    by_level = replace(model, precision=precision(states.data.structure, level))
+    return _span(states, by_level, one.candidate.effect, column[:, :, 0], best)
+
+
+def _judged(
+    states: States, model: Model, one: Signature, span: StampSpan
 ) -> tuple[float, Signature]:
-    """(log p of the effect in its stretch as a noise level shows it, its signature there)."""
-    data = states.data
-    by_level = replace(model, precision=precision(data.structure, level))
-    span = _span(states, by_level, one.candidate.effect, column[:, :, 0], best)
-    cut = cut_to(span, one, data.view.log.time_s)
+    """(log p of the effect in a stretch, its signature there)."""
+    cut = cut_to(span, one, states.data.view.log.time_s)
     (judged,) = _within(states, span).judged(model, [cut.columns])
     return judged.log_p, cut
 
@@ -308,7 +314,7 @@ def _gains(model: Model, weighted: Array, shape: Array, tried: list[tuple[int, i
     row = np.arange(shape.shape[0])
     masks = np.stack([((row >= a) & (row < b)).astype(float) for a, b in tried], axis=1)
     columns = shape[:, :, None] * masks[:, None, :]
-    own = np.sum(columns * model.precision.solve(columns), axis=(0, 1))
+    own = model.precision.squares(columns)
     score = np.sum(columns * weighted[:, :, None], axis=(0, 1))
     gains: Array = 0.5 * score**2 / np.maximum(own, 1e-300)
     return gains

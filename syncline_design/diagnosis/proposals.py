@@ -60,6 +60,7 @@ MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
 WANDER_NATS = (
     15.0  # slow noise can take the shape of anything slow, so it has to be that much better
 )
+ROUGHLY = 0.5  # of what is wanted, below which no better ends of a stretch will make up for it
 TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
 PAIRS = 8  # effects two by two that are judged by slow states, the likeliest ones
 
@@ -180,7 +181,7 @@ class Proposals:
         free = self.free_signatures(model)
         asked = in_a_part_of_white(self.states, model, free, least, level)
         asked += self.knocked(model, free)
-        trials = [self.trial(model, one, level, parted=True) for one in asked]
+        trials = [self.trial(model, one, level, parted=least) for one in asked]
         kept = [t for t in trials if t.gain > least and plausible(self.data, t.model)]
         stand = [t for t in kept if self.stand_all(t.model, [t.candidate.label], STRETCHES)]
         return preferred(stand) or found
@@ -282,11 +283,15 @@ class Proposals:
         return [entry for entry in kept if entry[0] > kept[0][0] - reach][:TRIED]
 
     def trial(
-        self, model: Model, found: Signature, level: NoiseLevel, *, parted: bool = False
+        self, model: Model, found: Signature, level: NoiseLevel, *, parted: float = math.inf
     ) -> Trial:
-        """The model with this candidate, fitted by re-simulation; parted: in a part of the log."""
+        """The model with this candidate, fitted by re-simulation.
+
+        parted: nat that it has to gain in a part of the log, whose ends are found anew if it may.
+        """
         fitted = with_effect(self.data, model, found, level)
-        fitted = refined(self.states, fitted) if parted else fitted
+        if model.nll - fitted.nll > ROUGHLY * parted:
+            fitted = refined(self.states, fitted)
         freedom = freedom_of(found.candidate.effect)
         return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
 
@@ -295,7 +300,7 @@ class Proposals:
         free = self.free_signatures(model)
         limit = self.chance(len({s.candidate.label for s in self.signatures}))
         found = in_a_part(self.states, model, free, limit, ladder(self.data, model))
-        trials = [self.trial(model, one, model.level, parted=True) for one in found]
+        trials = [self.trial(model, one, model.level, parted=WANDER_NATS) for one in found]
         kept = [t for t in trials if t.gain > WANDER_NATS and plausible(self.data, t.model)]
         return preferred(kept)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.covariance import Precision
-from syncline_design.diagnosis.fitting import inner, inverse_scaled
+from syncline_design.diagnosis.fitting import inverse_scaled
 from syncline_design.diagnosis.gap_result import Regime
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import rotate
@@ -115,7 +115,7 @@ def _own_sizes(known: Precision, axes: Array, cells: Sequence[NDArray[np.bool_]]
     for at in range(0, len(cells), count):
         inside = np.stack(cells[at : at + count], axis=1).astype(float)
         columns = (axes[:, :, None, :] * inside[:, None, :, None]).reshape(len(axes), 3, -1)
-        own = np.einsum("nij,nij->j", columns, known.solve(columns))
+        own = known.squares(columns)
         found.append(own.reshape(-1, axes.shape[2]))
     return np.concatenate(found) if found else np.zeros((0, axes.shape[2]))
 
@@ -155,7 +155,7 @@ def first_disagreement_s(view: Scene, error: Array, known: Precision) -> float |
             continue
         columns = np.zeros((len(view), 3, 3))
         columns[a:b] = np.eye(3)
-        normal = inner(columns, known.solve(columns))
+        normal = known.information(columns)
         score = weighted[a:b].sum(axis=0)
         if float(score @ inverse_scaled(normal) @ score) > limit:
             return float(view.log.time_s[a])

@@ -113,13 +113,10 @@ def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Sh
     projector, root, single = _freed(normal, own.shape[2])
     score = projector @ inner(columns, residual[:, :, None])[:, 0]
     seen = root.T @ score
-    energies = []
-    for shift in shifts:
-        rolled = np.roll(residual, int(shift), axis=0)
-        turned = root.T @ (projector @ inner(columns, rolled[:, :, None])[:, 0])
-        energies.append(float(turned @ turned))
+    rolled = np.stack([np.roll(residual, int(shift), axis=0) for shift in shifts], axis=2)
+    turned = root.T @ (projector @ inner(columns, rolled))
     freedom = root.shape[1]
-    grown = float(np.median(energies)) / max(freedom, 1)
+    grown = float(np.median(np.sum(turned**2, axis=0))) / max(freedom, 1)
     inflation = float(np.clip(grown, 1.0, MOST_INFLATION))
     peak = float(np.max((score * single) ** 2, initial=0.0)) / inflation
     p = chi_square_beyond(float(seen @ seen) / inflation, max(freedom, 1))

@@ -30,6 +30,7 @@ from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.chain import rotation_exp
 
 SLOPES = 8  # sets of effects whose slopes are kept
+PARTS = 12  # poses, places and beams of stages that are
 ERRORS = 8  # sets of effects whose error is
 NO_LEVER = (0.0, 0.0, 0.0)
 
@@ -45,6 +46,7 @@ class Scene:
     known: tuple[Acting, ...]  # the spec's own effects and mean timestamp errors
     slopes: Recent = field(default_factory=lambda: Recent(SLOPES), repr=False, compare=False)
     errors: Recent = field(default_factory=lambda: Recent(ERRORS), repr=False, compare=False)
+    parts: Recent = field(default_factory=lambda: Recent(PARTS), repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.log)
@@ -312,15 +314,33 @@ def _corrected_error(view: Scene, departures: Sequence[Departures]) -> Array:
 
 def _true_pose(view: Scene, index: int, departed: Departures) -> Array:
     """R_nb (n, 3, 3) at the moment at which the ranging sensor measured."""
-    time_s, rows = view.log.time_s, view.rows[index]
-    rotation = rows.rotation
-    if np.any(departed.attitude_euler_rad):
-        rotation = euler_to_rotation(rows.euler_rad - departed.attitude_euler_rad)
-    if np.any(departed.attitude_rotation_rad):
-        rotation = rotation @ rotation_exp(-departed.attitude_rotation_rad)
-    late = departed.attitude_shift_s
-    ranged_at = time_s + departed.ranging_shift_s
-    return view.motions[index].turned(rotation, time_s + late, ranged_at, late)
+
+    def turned() -> Array:
+        time_s, rows = view.log.time_s, view.rows[index]
+        rotation = rows.rotation[:]  # what is kept is locked
+        if np.any(departed.attitude_euler_rad):
+            rotation = euler_to_rotation(rows.euler_rad - departed.attitude_euler_rad)
+        if np.any(departed.attitude_rotation_rad):
+            rotation = rotation @ rotation_exp(-departed.attitude_rotation_rad)
+        late = departed.attitude_shift_s
+        ranged_at = time_s + departed.ranging_shift_s
+        return view.motions[index].turned(rotation, time_s + late, ranged_at, late)
+
+    return view.parts.of(_asked_of("pose", index, _of_pose(departed)), turned)
+
+
+def _of_pose(departed: Departures) -> tuple[Array, ...]:
+    return (
+        departed.attitude_euler_rad,
+        departed.attitude_rotation_rad,
+        departed.attitude_shift_s,
+        departed.ranging_shift_s,
+    )
+
+
+def _asked_of(what: str, index: int, moved: Sequence[Array]) -> Hashable:
+    """What a part of the chain depends on: most parameters move one part, the others are kept."""
+    return what, index, *((one.shape, one.tobytes()) for one in moved)
 
 
 def _reference_point(
@@ -332,29 +352,45 @@ def _reference_point(
     pose: Array,
 ) -> Array:
     """p (n, 3) at the moment of ranging, from the antenna's true place at its own moment."""
-    lever = view.rows[index].antenna_m + departed.antenna_m
-    own, ranged = view.log.time_s + shift_s, view.log.time_s + departed.ranging_shift_s
-    if np.array_equal(own, ranged):
-        return reading - rotate(pose, lever)
-    motion = view.motions[index]
-    there = motion.turned(pose, ranged, own, departed.attitude_shift_s)
-    return reading - rotate(there, lever) - motion.displacement(ranged, own, shift_s)
+
+    def carried() -> Array:
+        lever = view.rows[index].antenna_m + departed.antenna_m
+        own, ranged = view.log.time_s + shift_s, view.log.time_s + departed.ranging_shift_s
+        if np.array_equal(own, ranged):
+            return reading - rotate(pose, lever)
+        motion = view.motions[index]
+        there = motion.turned(pose, ranged, own, departed.attitude_shift_s)
+        return reading - rotate(there, lever) - motion.displacement(ranged, own, shift_s)
+
+    moved = (*_of_pose(departed), departed.antenna_m, reading, shift_s)
+    return view.parts.of(_asked_of("place", index, moved), carried)
 
 
 def _true_vector(view: Scene, index: int, departed: Departures) -> Array:
     """r n [m] in the body (n, 3), the measured one without its departures."""
-    rows = view.rows[index]
-    if view.log.stages[index].range_m is None:
-        return np.zeros((len(rows), 3))
-    distance = (rows.range_m - departed.range_m) / (1.0 + departed.range_scale)
-    pointing = bearing(
-        rows.azimuth_rad - departed.azimuth_rad, rows.elevation_rad - departed.elevation_rad
+
+    def beam() -> Array:
+        rows = view.rows[index]
+        if view.log.stages[index].range_m is None:
+            return np.zeros((len(rows), 3))
+        distance = (rows.range_m - departed.range_m) / (1.0 + departed.range_scale)
+        pointing = bearing(
+            rows.azimuth_rad - departed.azimuth_rad, rows.elevation_rad - departed.elevation_rad
+        )
+        if np.any(departed.bearing_rotation_rad):
+            turn = rotation_exp(departed.bearing_rotation_rad)
+            pointing = rotate(np.broadcast_to(turn, (len(rows), 3, 3)), pointing)
+        vector: Array = distance[:, None] * pointing
+        return vector
+
+    moved = (
+        departed.range_m,
+        departed.range_scale,
+        departed.azimuth_rad,
+        departed.elevation_rad,
+        departed.bearing_rotation_rad,
     )
-    if np.any(departed.bearing_rotation_rad):
-        turn = rotation_exp(departed.bearing_rotation_rad)
-        pointing = rotate(np.broadcast_to(turn, (len(rows), 3, 3)), pointing)
-    vector: Array = distance[:, None] * pointing
-    return vector
+    return view.parts.of(_asked_of("beam", index, moved), beam)
 
 
 def acting(name: str, sensor: ActsOn, stage: int, values: Mapping[str, float]) -> Acting:

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from syncline_design.diagnosis.candidates import Signature, slopes
-from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled, solve_scaled
+from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled, solve_scaled
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
     common_loading,
@@ -67,11 +67,12 @@ def gram(data: Data, model: Model, found: Sequence[Signature], level: NoiseLevel
     for s in found:
         groups.append(slice(at, at + s.columns.shape[2]))
         at = groups[-1].stop
-    columns = np.concatenate([own, *(np.nan_to_num(s.columns) for s in found)], axis=2)
+    error = model.error[:, :, None]
+    columns = np.concatenate([own, *(np.nan_to_num(s.columns) for s in found), error], axis=2)
     known = model.precision if level is model.level else precision(data.structure, level)
-    weighted = known.solve(columns)
-    normal = inner(columns, weighted)
-    score = inner(weighted, model.error[:, :, None])[:, 0]
+    normal = known.information(columns)
+    nll = known.likelihood_of(float(normal[-1, -1]))
+    normal, score = normal[:-1, :-1], normal[:-1, -1]
     if width:
         inverse = inverse_scaled(normal[:width, :width])
         cross = normal[:width, width:]
@@ -80,7 +81,6 @@ def gram(data: Data, model: Model, found: Sequence[Signature], level: NoiseLevel
         normal = normal[width:, width:] - cross.T @ inverse @ cross
         lost = np.diag(normal) < LOST * whole  # the model's own effects can do all of it
         score[lost], normal[lost], normal[:, lost] = 0.0, 0.0, 0.0
-    nll = known.negative_log_likelihood(model.error)
     return Gram(score, normal, tuple(groups), nll)
 
 

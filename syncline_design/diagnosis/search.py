@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from syncline_design.diagnosis.episodes import Episode, episode_effect, episodes
 from syncline_design.diagnosis.fitting import Data, Model, finely, fit
 from syncline_design.diagnosis.identity import without
 from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
-from syncline_design.diagnosis.pairs import clearly_two, in_the_place, with_pair
+from syncline_design.diagnosis.pairs import clear_nats, clearly_two, in_the_place, with_pair
 from syncline_design.diagnosis.parts import cut_down
 from syncline_design.diagnosis.proposals import Label, Proposals
 from syncline_design.diagnosis.settings import DiagnosisSettings
@@ -210,7 +211,8 @@ class Search:
             free = [s for s in self.proposals.free_signatures(rest)
                     if s.asked_jointly or s.candidate.label == one.label]  # fmt: skip
             rungs = self.proposals.rungs_of(rest, free)
-            for pair in in_the_place(rungs, free, one.label)[:TRIED_PAIRS]:
+            worth = cache(partial(clear_nats, self.data, free))
+            for pair in in_the_place(rungs, free, one.label, worth)[:TRIED_PAIRS]:
                 two = with_pair(self.data, rest, pair)
                 if (
                     clearly_two(self.data, two, self.at_least(model, two), free)

@@ -62,6 +62,9 @@ class States:
     kept: LastMade[HeldFixed] = field(
         default_factory=lambda: LastMade(1), repr=False, compare=False
     )
+    whitened: LastMade[Weighted] = field(
+        default_factory=LastMade, repr=False, compare=False
+    )  # whatever the blocks
 
     @property
     def count(self) -> int:
@@ -75,12 +78,21 @@ class States:
             return []
 
         def made() -> HeldFixed:
-            acting = np.nan_to_num(slopes(self.data.view, model.acting))
-            known = self._weighted(model.level, model.error, acting if own is None else own)
+            known = self._beside_own(model, own)
             return HeldFixed(known, [self.block] if self.seen is None else [self.block, self.seen])
 
         asked = (model, self.data, self.block, self.explained, own)
         return self.kept.of(asked, made).judged(groups)
+
+    def _beside_own(self, model: Model, own: Array | None) -> Weighted:
+        """The courses beside a model's own effects; blocks of any kind are made of these rows."""
+
+        def made() -> Weighted:
+            acting = np.nan_to_num(slopes(self.data.view, model.acting))
+            return self._weighted(model.level, model.error, acting if own is None else own)
+
+        asked = (model, self.data, self.courses, self.explained, own)
+        return self.whitened.of(asked, made)
 
     def beside(self, *columns: Array) -> States:
         """The same with slow courses sized beside these columns (n, 3, p) as well: what is asked
@@ -194,7 +206,8 @@ class States:
         sizing = self._sizing(level)
         size2 = sizing.start
         for _ in range(REWEIGHTED):
-            total = every.T @ (weight[:, None] * every) / scale2
+            rooted = np.sqrt(weight)[:, None] * every
+            total = rooted.T @ rooted / scale2  # symmetric: half the work
             normal, score = total[: width + q, : width + q], total[: width + q, width + q]
             if more.shape[1]:
                 sized = _beside(total, np.r_[0:width, width + q + 1 : len(total)], width, q)

@@ -26,7 +26,6 @@ from syncline_design.diagnosis.fitting import (
     Opened,
     adjusted,
     fit,
-    inner,
     inverse_scaled,
 )
 from syncline_design.diagnosis.motion_scatter import grows_with_motion
@@ -171,7 +170,7 @@ def _best_place(data: Data, model: Model, name: str, places: Array) -> float:
     moved = shape[:, :, None] * (since[:, None] >= places)[:, None, :]
     others = np.nan_to_num(slopes(data.view, model.acting))[:, :, : -len(values)]
     columns = np.concatenate([others, moved, error[:, :, None]], axis=2)
-    normal = inner(columns, model.precision.solve(columns))
+    normal = model.precision.information(columns)
     width, count = others.shape[2], len(places)
     held, cross = normal[:width, :width], normal[:width, width:]
     left = normal[width:, width:] - cross.T @ inverse_scaled(held) @ cross

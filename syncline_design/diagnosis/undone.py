@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.candidates import Signature, slopes
-from syncline_design.diagnosis.fitting import Data, Model, inner
+from syncline_design.diagnosis.fitting import Data, Model, scored
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.normal import NEARLY_ALL
@@ -142,9 +142,7 @@ def joint_of(data: Data, model: Model, asked: Sequence[Signature], error: Array)
         axis=2,
     )
     every = np.concatenate([own, columns], axis=2)
-    weighted = model.precision.solve(every)
-    normal = inner(every, weighted)
-    score = inner(weighted, error[:, :, None])[:, 0]
+    normal, score = scored(model.precision, every, error)
     width = own.shape[2]
     if width:  # what was found is free as well
         inverse = np.linalg.pinv(normal[:width, :width], rcond=1e-12, hermitian=True)
