@@ -325,7 +325,7 @@ class Changes(RunSums):
             first = self._compared(look, *with_beside(self.pool, look, self.beside))
             likely = self._likeliest_of(look, first) if look > 2 else None
             off = () if likely is None else (likely,)
-            found = self._compared(look, first.normal, first.score, *off)
+            found = self._compared(look, first.normal, first.score, *off) if off else first
             one = self._clear(look, found, whole := first.parts, off)
             if one is not None:
                 passing = self._beside_passing(look, first, found, off)

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.column_sizes import column_sizes
+from syncline_design.campaign.hermitian import eigen
 from syncline_design.campaign.pool import Index
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -55,27 +56,29 @@ def shown_constants(
     order (a latency and a filter's lag) so differ a little where a change was named, and none
     elsewhere: both free, huge values of either sign would stand for the change as constants.
     """
-    whole, found = total, list[Constant]()
+    found = list[Constant]()
+    whole = [blocks_of(_blocks(total, index)) for _, index in groups]
     while True:
-        taken = [one.term for one in found]
         best, at, least = None, 0, SHOWN_NATS
-        for terms, index in groups:
-            apart = apart_of(_blocks(whole, index), _blocks(total, index))
+        for (terms, index), own in zip(groups, whole, strict=True):
+            apart = own.apart(_blocks(total, index))
             along = np.einsum("gap,ga->gp", apart.turn, score[index])
             gains = 0.5 * np.sum(along**2 * apart.another, axis=1) / inside[terms] - index.shape[1]
-            gains[np.isin(terms, taken)] = 0.0
+            for one in found:
+                gains[terms == one.term] = 0.0
             k = int(np.argmax(gains))
             if gains[k] >= least:
-                best, at, least = (terms, index, apart), k, float(gains[k])
+                best, at, least = (terms, index, apart, own), k, float(gains[k])
         if best is None:
             return found
-        terms, index, apart = best
-        own, turn, another = index[at], apart.turn[at], apart.another[at]
-        found.append(Constant(int(terms[at]), own, held_of(_blocks(whole, own), turn, another)))
+        terms, index, apart, own = best
+        place, turn, another = index[at], apart.turn[at], apart.another[at]
+        held = held_of(own.information[at], turn, another)
+        found.append(Constant(int(terms[at]), place, held))
         inverse = (turn * another) @ turn.T
-        across = total[:, own]
-        score = score - across @ (inverse @ score[own])
-        total = total - across @ inverse @ total[own]
+        across = total[:, place]
+        score = score - across @ (inverse @ score[place])
+        total = total - across @ inverse @ total[place]
 
 
 def _blocks(total: Array, index: Index) -> Array:
@@ -88,13 +91,28 @@ def held_of(own: Array, turn: Array, another: Array) -> Array:
     return np.asarray(alike @ alike.T / PLAUSIBLE**2)
 
 
-def apart_of(own: Array, left: Array) -> Apart:
-    """own, left (G, p, p): information of effects alone, and with those shown freed."""
+@dataclass(frozen=True, slots=True)
+class AloneOfSize:
+    """Information of effects of one size alone (G, p, p), the sizes of its columns, their products,
+    and its inverse root in columns of size 1: made once, and held against whatever is freed."""
+
+    information: Array
+    scale: Array
+    squares: Array
+    root: Array
+
+    def apart(self, left: Array) -> Apart:
+        """left (G, p, p): the information with those shown freed."""
+        inner = np.swapaxes(self.root, 1, 2) @ (left / self.squares) @ self.root
+        share, turned = eigen(0.5 * (inner + np.swapaxes(inner, 1, 2)))
+        return Apart((self.root @ turned) / self.scale[:, :, None], share)
+
+
+def blocks_of(own: Array) -> AloneOfSize:
+    """own (G, p, p): information of effects alone."""
     scale = column_sizes(np.einsum("gaa->ga", own))
     squares = scale[:, :, None] * scale[:, None, :]
-    values, vectors = np.linalg.eigh(own / squares)
+    values, vectors = eigen(own / squares)
     seen = values > NO_INFORMATION
     root = vectors * np.where(seen, np.where(seen, values, 1.0) ** -0.5, 0.0)[:, None, :]
-    inner = np.swapaxes(root, 1, 2) @ (left / squares) @ root
-    share, turned = np.linalg.eigh(0.5 * (inner + np.swapaxes(inner, 1, 2)))
-    return Apart((root @ turned) / scale[:, :, None], share)
+    return AloneOfSize(own, scale, squares, root)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from syncline_design.campaign.column_sizes import column_sizes
+from syncline_design.campaign.hermitian import pseudo_inverses
 from syncline_design.campaign.pool import Pool, inverted
 from syncline_design.campaign.run_records import Change, Freed, Runs, SameSize
 from syncline_design.campaign.trends import shapes
@@ -76,5 +77,4 @@ def pseudo_inverse(total: Array) -> Array:
     """total^-1 (..., P, P), columns scaled alike first."""
     scale = column_sizes(np.diagonal(total, axis1=-2, axis2=-1))
     squares = scale[..., :, None] * scale[..., None, :]
-    found: Array = np.linalg.pinv(total / squares, hermitian=True, rcond=1e-13) / squares
-    return found
+    return np.asarray(pseudo_inverses(total / squares, 1e-13) / squares)

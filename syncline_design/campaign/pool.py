@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.campaign.hermitian import pseudo_inverses
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.result import Scope
 from syncline_design.diagnosis.slow_sums import LOST
@@ -283,5 +284,7 @@ def inverted(normal: Array) -> Array:
     squares = scale[..., :, None] * scale[..., None, :]
     if normal.shape[-1] == 0:
         return np.zeros_like(normal)
-    inverse: Array = np.linalg.pinv(normal / squares, rcond=LOST, hermitian=True) / squares
+    inverse: Array = pseudo_inverses(normal / squares, LOST) / squares
+    if np.all(seen):
+        return inverse
     return np.where(seen[..., :, None] & seen[..., None, :], inverse, 0.0)

@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.changes import Changes
-from syncline_design.campaign.constants import apart_of
+from syncline_design.campaign.constants import AloneOfSize, blocks_of
 from syncline_design.campaign.freed_runs import pseudo_inverse
 from syncline_design.campaign.pool import Index, inverted
 from syncline_design.campaign.run_records import Change, Differing
@@ -95,6 +95,17 @@ class PossibleChanges:
         scores = over @ score - kept @ score.sum(axis=0)
         return both.transpose(0, 2, 1, 3).reshape(count * size, -1), scores.ravel()
 
+    @cached_property
+    def _alone(self) -> tuple[tuple[Index, AloneOfSize], ...]:
+        """By size of effects: columns with every trend (R G, p), and what each tells alone."""
+        normal, found = self._sums[0], []
+        places = np.arange(len(self.trends))[:, None, None] * len(self.changes.pool.labels)
+        for group in self.changes.groups:
+            columns = (places + group.index).reshape(-1, group.index.shape[1])
+            own = normal[columns[:, :, None], columns[:, None, :]]
+            found.append((columns, blocks_of(own)))
+        return tuple(found)
+
     def _columns(self, ones: Sequence[PossibleChange]) -> Index:
         size = len(self.changes.pool.labels)
         known = {trend: k for k, trend in enumerate(self.trends)}
@@ -116,22 +127,31 @@ class PossibleChanges:
             found.append(Change(term, one.trend, values, inverse[own, own], 0.0))
         return found
 
+    @cached_property
+    def _gains(self) -> dict[tuple[PossibleChange, ...], Array]:
+        return {}
+
     def gains(self, beside: Sequence[PossibleChange]) -> Array:
         """What every trend and effect (R, C) explains beside others, less a nat a value, with the
-        log of the effect's weight, and that of the trend where no other has it."""
+        log of the effect's weight, and that of the trend where no other has it.  A search asks for
+        the same more than once."""
+        key = tuple(beside)
+        if key not in self._gains:
+            self._gains[key] = self._beside(key)
+        return self._gains[key].copy()
+
+    def _beside(self, beside: tuple[PossibleChange, ...]) -> Array:
         normal, score = self._sums
-        at, size = self._columns(beside), len(self.changes.pool.labels)
-        kept = normal[:, at] @ inverted(normal[np.ix_(at, at)])
+        at = self._columns(beside)
+        across = normal[:, at]
+        kept = across @ inverted(across[at])
         left = score - kept @ score[at]
         count = len(self.trends)
         found = np.zeros((count, len(self.changes.terms)))
-        for group in self.changes.groups:
-            index = np.arange(count)[:, None, None] * size + group.index
-            cols = index.reshape(-1, index.shape[2])
-            own = normal[cols[:, :, None], cols[:, None, :]]
-            taken = np.einsum("kpm,kmq->kpq", kept[cols], np.swapaxes(normal[cols][:, :, at], 1, 2))
-            apart = apart_of(own, own - taken)
-            along = np.einsum("kap,ka->kp", apart.turn, left[cols])
+        for group, (columns, own) in zip(self.changes.groups, self._alone, strict=True):
+            taken = np.einsum("kpm,kmq->kpq", kept[columns], np.swapaxes(across[columns], 1, 2))
+            apart = own.apart(own.information - taken)
+            along = np.einsum("kap,ka->kp", apart.turn, left[columns])
             square = np.sum(along**2 * apart.another, axis=1).reshape(count, -1)
             found[:, group.terms] = 0.5 * square / self.noise - group.index.shape[1]
         found += self._weights(beside)[:, None] + self.changes.log_weights

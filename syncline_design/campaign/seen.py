@@ -18,7 +18,7 @@ from syncline_design.campaign.possible_changes import (
 )
 from syncline_design.campaign.run_records import Change
 from syncline_design.campaign.trends import trends
-from syncline_design.campaign.what_changed import Taken, possible_beside, what_changed
+from syncline_design.campaign.what_changed import Taken, possible_beside, possible_of, what_changed
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -54,7 +54,9 @@ def seen_changes(changes: Changes, first: int, threshold: float) -> tuple[Seen, 
         fitted = _together(changes, [one.one for one in told], count)
         weakest = min(range(len(told)), key=lambda k: _explained(fitted[k]))
         if _explained(fitted[weakest]) >= threshold:
-            seen = [_seen(changes, told, k, fitted, first) for k in range(len(told))]
+            ones = [one.one for one in told]
+            possible = possible_beside(changes, fitted, count).knowing(ones)
+            seen = [_seen(possible, told, k, fitted, first) for k in range(len(told))]
             return tuple(sorted(_with_ends(seen), key=lambda one: one.change.k))
         if len(told) == 1:
             return (_went_back(changes, told[0], first),)
@@ -98,14 +100,13 @@ def _went_back(changes: Changes, told: Taken, first: int) -> Seen:
 
 
 def _seen(
-    changes: Changes, told: Sequence[Taken], k: int, fitted: Sequence[Change], first: int
+    possible: PossibleChanges, told: Sequence[Taken], k: int, fitted: Sequence[Change], first: int
 ) -> Seen:
     """One of several, the others free beside it."""
-    ones, count = [one.one for one in told], changes.pool.count
-    possible = possible_beside(changes, fitted, count).knowing(ones)
-    others = tuple((changes.terms[i], worse) for i, worse in possible.rivals(ones, k))
+    ones, terms = [one.one for one in told], possible.changes.terms
+    others = tuple((terms[i], worse) for i, worse in possible.rivals(ones, k))
     near = _near(possible, ones, k, fitted[k])
-    return _dated(near, count, told[k], fitted[k], first, others)
+    return _dated(near, possible.look, told[k], fitted[k], first, others)
 
 
 def _near(
@@ -173,8 +174,9 @@ def _together(changes: Changes, ones: Sequence[PossibleChange], look: int) -> li
     known = [replace(changes.single(look, one.effect, one.trend.begun), trend=one.trend)
              for one in ones]  # fmt: skip
     for _ in range(ROUNDS):  # without what is known the runs tell their constants and scatter
-        temper = changes.without(*known).temper(look)
-        known = possible_beside(changes, known, look).values(ones)
+        left = changes.without(*known)
+        temper = left.temper(look)
+        known = possible_of(changes, left, known, look).values(ones)
     row = {trend: k for k, trend in enumerate(trends(look))}
     return [replace(own, covariance=temper[row[one.trend.begun], one.effect] * own.covariance)
             for one, own in zip(ones, known, strict=True)]  # fmt: skip

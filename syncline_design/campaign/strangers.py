@@ -28,7 +28,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.campaign.changes import Changes
-from syncline_design.campaign.constants import Apart, apart_of, held_of
+from syncline_design.campaign.constants import Apart, blocks_of, held_of
 from syncline_design.campaign.freed_runs import pseudo_inverse
 from syncline_design.campaign.pool import Index, Term, inverted
 from syncline_design.campaign.run_records import Runs
@@ -173,12 +173,12 @@ def _held(changes: Changes, run: int, apart: tuple[int, ...]) -> Odd:
 
 @dataclass(frozen=True, eq=False)
 class Own:
-    """Information W (P, P) and score u (P,) of what is another in one run alone, and log of how
-    likely it is that runs differ as they are freed there."""
+    """Information W (N, P, P) and score u (N, P) of what is another in one run alone, by so many
+    ways in which runs may differ, and log of how likely each is (N,)."""
 
     normal: Array
     score: Array
-    log_share: float = 0.0
+    log_share: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,29 +193,31 @@ class Known:
     @cached_property
     def alike(self) -> Own:
         """Where nothing else differs from run to run."""
-        return self._own(self.normal, self.score)
+        return self._own(self.normal[None], self.score[None], np.zeros(1))
 
     @cached_property
-    def apart(self) -> tuple[Own, ...]:
-        """The same where nothing or one effect does, by each of APART; shares sum to 1."""
+    def apart(self) -> tuple[float, Own]:
+        """The share of nothing else that differs, and the same where one effect does, by each of
+        APART; shares sum to 1."""
         odds = self.others.log_odds(len(self.runs.normal))
         total = float(np.logaddexp.reduce([0.0, *odds.ravel()]))
-        found = [replace(self.alike, log_share=-total)]
-        usual = self.runs.normal.mean(axis=0)
+        usual, found = self.runs.normal.mean(axis=0), []
         more = 1.0 + 1.0 / len(self.runs.normal)  # the mean of the others is as uncertain by it
-        for part, own in zip(self.others.parts, odds, strict=True):
+        sizes = np.square(APART)[:, None, None]
+        normals, scores = (np.repeat(one[None], len(APART), axis=0)
+                           for one in (self.normal, self.score))  # fmt: skip
+        for part in self.others.parts:
             index = part.index
-            spread = more * inverted(usual[np.ix_(index, index)])
-            for size, log_odds in zip(APART, own, strict=True):
-                freed = freed_of(self.normal[None], self.score[None], index, size**2 * spread)
-                one = self._own(*(each[0] for each in freed))
-                found.append(replace(one, log_share=float(log_odds) - total))
-        return tuple(found)
+            spread = sizes * (more * inverted(usual[index[:, None], index]))
+            found.append(freed_of(normals, scores, index, spread))
+        normal, score = (np.concatenate(each) for each in zip(*found, strict=True))
+        return -total, self._own(normal, score, odds.ravel() - total)
 
-    def _own(self, normal: Array, score: Array) -> Own:
+    def _own(self, normal: Array, score: Array, log_share: Array) -> Own:
         inverse = pseudo_inverse(self.runs.total + normal)
-        fit = inverse @ (self.runs.score.sum(axis=0) + score)
-        return Own(normal - normal @ inverse @ normal, score - normal @ fit)
+        fit = inverse @ (self.runs.score.sum(axis=0) + score)[:, :, None]
+        apart = normal - normal @ inverse @ normal
+        return Own(apart, score - (normal @ fit)[:, :, 0], log_share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,50 +243,55 @@ class Odd:
         nothing else differs if that is no less than the limit."""
         doubt = 1.0 if beside else self.doubt  # a run that is odd is no more like the others
         temper, inside = doubt * float(self.temper[k]), float(self.inside[k])
-        first = self._chance(self.known.alike, k, beside, temper) + self.charge
+        first = self._chances(self.known.alike, k, beside, temper)[0] + self.charge
         if first >= limit:
-            return first
-        alike, *apart = self.known.apart
-        each = [self._chance(one, k, beside, inside) + one.log_share for one in apart]
-        return float(np.logaddexp.reduce([first + alike.log_share, *np.add(each, self.charge)]))
+            return float(first)
+        share, apart = self.known.apart
+        each = self._chances(apart, k, beside, inside) + apart.log_share
+        return float(np.logaddexp.reduce([first + share, *(each + self.charge)]))
 
-    def _chance(self, own: Own, k: int, beside: Sequence[int], temper: float) -> float:
+    def _chances(self, own: Own, k: int, beside: Sequence[int], temper: float) -> Array:
+        """log of the chances of what an effect departs by, (N,)."""
         more, free = self._more(own, k, beside)
-        if not free:
-            return 0.0
-        square = more / temper
+        pairs = zip(map(float, more / temper), map(int, free), strict=True)
+        return np.array([self._chance(*pair) if pair[1] else 0.0 for pair in pairs])
+
+    def _chance(self, square: float, free: int) -> float:
         if self.known.runs.freed:
             return log_f(square / free, free, len(self.known.runs.normal) - 1)
         return log_p_of(square, free)
 
-    def _more(self, own: Own, k: int, beside: Sequence[int]) -> tuple[float, int]:
-        """u' W^-1 u of an effect, others of the run free beside it, and how many values that is:
-        of its directions that are another thing than they, as of constants."""
+    def _more(self, own: Own, k: int, beside: Sequence[int]) -> tuple[Array, Index]:
+        """u' W^-1 u of an effect (N,), others of the run free beside it, and how many values that
+        is: of its directions that are another thing than they, as of constants."""
         index, rest = self.changes.terms[k].index, self._index(beside)
-        across = own.normal[np.ix_(index, rest)] @ inverted(own.normal[np.ix_(rest, rest)])
-        apart = self._apart(own, k, beside)
-        along = (own.score[index] - across @ own.score[rest]) @ apart.turn[0]
-        return float(along**2 @ apart.another[0]), int(np.sum(apart.another[0] > 0.0))
+        apart, across = self._apart(own, k, beside)
+        left = own.score[:, index] - (across @ own.score[:, rest, None])[:, :, 0]
+        along, another = (left[:, None, :] @ apart.turn)[:, 0], apart.another
+        square: Array = ((along**2)[:, None, :] @ another[:, :, None])[:, 0, 0]
+        return square, np.sum(another > 0.0, axis=1)
 
-    def _apart(self, own: Own, k: int, beside: Sequence[int]) -> Apart:
+    def _apart(self, own: Own, k: int, beside: Sequence[int]) -> tuple[Apart, Array]:
+        """What an effect has apart from others, and how they take its score (N, p, q)."""
         index, rest = self.changes.terms[k].index, self._index(beside)
-        whole, across = own.normal[np.ix_(index, index)], own.normal[np.ix_(index, rest)]
-        left = whole - across @ inverted(own.normal[np.ix_(rest, rest)]) @ across.T
-        return apart_of(whole[None], left[None])
+        whole = own.normal[:, index[:, None], index]
+        across = own.normal[:, index[:, None], rest]
+        taken = across @ inverted(own.normal[:, rest[:, None], rest])
+        return blocks_of(whole).apart(whole - taken @ np.swapaxes(across, 1, 2)), taken
 
     def _together(self, taken: Sequence[int]) -> tuple[Array, Array]:
         """Values of several effects, and their covariance by the noise fitted: a direction that is
         no other thing than what was taken before stays small, or the two would undo each other."""
         index, own, at = self._index(taken), self.known.alike, 0
-        normal = own.normal[np.ix_(index, index)]
+        normal = own.normal[0][np.ix_(index, index)]
         for place, k in enumerate(taken):
-            apart, term = self._apart(own, k, taken[:place]), self.changes.terms[k]
-            whole = own.normal[np.ix_(term.index, term.index)]
+            (apart, _), term = self._apart(own, k, taken[:place]), self.changes.terms[k]
+            whole = own.normal[0][np.ix_(term.index, term.index)]
             among = slice(at, at + term.size)
             normal[among, among] += held_of(whole, apart.turn[0], apart.another[0])
             at += term.size
         covariance = inverted(normal)
-        return covariance @ own.score[index], covariance
+        return covariance @ own.score[0, index], covariance
 
     def _index(self, taken: Sequence[int]) -> Index:
         none = np.zeros(0, dtype=np.int64)
@@ -321,7 +328,7 @@ class Odd:
 
     def _gains(self, places: Sequence[int], beside: Sequence[int]) -> dict[int, float]:
         """What effects explain beside others, less a nat a value, by one noise: a run has one."""
-        more = {k: self._more(self.known.alike, k, beside)[0] for k in places}
+        more = {k: float(self._more(self.known.alike, k, beside)[0][0]) for k in places}
         noise = float(self.inside[max(places, key=more.__getitem__)])
         return {k: 0.5 * more[k] / noise - self.changes.terms[k].size for k in places}
 

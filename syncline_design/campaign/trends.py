@@ -7,6 +7,7 @@ are looked for at the run EARLY as at the first, and DRIFTING of them all are dr
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Final, Literal
 
@@ -55,9 +56,12 @@ def trends(look: int) -> tuple[Trend, ...]:
     return tuple(Trend(kind, k) for kind in kinds for k in range(1, look))
 
 
+@functools.lru_cache(maxsize=256)
 def shapes(look: int) -> Array:
-    """Their h, (2 (look - 1), look)."""
-    return np.array([one.over(look) for one in trends(look)]).reshape(-1, look)
+    """Their h, (2 (look - 1), look), the same array at every call."""
+    found = np.array([one.over(look) for one in trends(look)]).reshape(-1, look)
+    found.flags.writeable = False
+    return found
 
 
 def log_weights(look: int) -> Array:

@@ -167,7 +167,13 @@ def _log_odds(
 def possible_beside(changes: Changes, fitted: Sequence[Change], look: int) -> PossibleChanges:
     """What could have changed; effects are free in every run that differ from one to the next where
     what was found is taken off: clearly, or rather than that anything else changed."""
-    left = changes.without(*fitted)
+    return possible_of(changes, changes.without(*fitted), fitted, look)
+
+
+def possible_of(
+    changes: Changes, left: Changes, fitted: Sequence[Change], look: int
+) -> PossibleChanges:
+    """The same; left: the runs without what was found."""
     needed = tuple(one.trend for one in fitted)
     rather = left.differs_rather(look)
     freed = (*left.compared(look).freed, *(() if rather is None else (rather,)))
