@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.diagnosis import candidates as effects_of
 from syncline_design.diagnosis.expected_noise import structure_of
@@ -32,6 +33,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 LOST: Final = 1e-9  # of a parameter's scaled information: below, the others hold it all
 STEP_AT: Final = 0.5  # of the drive: where a step is taken to happen
+Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,9 +169,15 @@ def sigmas(information: Array, index: Sequence[int], prior: Array | None = None)
     information: with what the noise shifts (`with_shift`) as its last row and column; a shift of
     the estimates counts like the scatter, sigma^2 + shift^2.
     """
-    covariance, lost = covariance_of(information[np.ix_(index, index)], prior)
-    shift = covariance @ information[index, -1]
-    size = np.sqrt(np.maximum(np.diag(covariance), 0.0) + shift**2)
+    own = covariance_of(block(information, index, index), prior)
+    return shifted(*own, information[np.asarray(index), -1])
+
+
+def shifted(covariance: Array, lost: Flags, shift: Array) -> Array:
+    """Standard uncertainty by a covariance (p, p) with what the noise shifts (p,); infinite of what
+    is lost."""
+    moved = covariance @ shift
+    size = np.sqrt(np.maximum(np.diagonal(covariance), 0.0) + moved**2)
     return np.where(lost, np.inf, size)
 
 
@@ -203,28 +211,35 @@ def with_shift(view: Scene, wanted: Sequence[Unknown], after: Array | None = Non
     return np.concatenate([columns(view, wanted, after), noise_shift(view)], axis=2)
 
 
-def covariance_of(information: Array, prior: Array | None = None) -> tuple[Array, Array]:
+def covariance_of(information: Array, prior: Array | None = None) -> tuple[Array, Flags]:
     """Covariance (p, p), and which parameters it holds no figure for (p,)."""
     whole = information if prior is None else information + np.diag(prior**-2.0)
-    size = np.diag(whole)
+    size = np.diagonal(whole)
     unseen = size <= 0.0
     scale = np.where(unseen, 1.0, np.sqrt(np.where(unseen, 1.0, size)))
     values, vectors = np.linalg.eigh(whole / scale[:, None] / scale)
     blind = values < LOST
     inverse = np.where(blind, 0.0, 1.0 / np.where(blind, 1.0, values))
     covariance = (vectors * inverse) @ vectors.T / scale[:, None] / scale
-    lost = unseen | (np.sum(vectors[:, blind] ** 2, axis=1) > 1e-6)
+    lost = unseen
+    if blind.any():
+        lost = unseen | (np.sum(vectors[:, blind] ** 2, axis=1) > 1e-6)
     return covariance, lost
 
 
 def schur(information: Array, own: Sequence[int], rival: Sequence[int]) -> Array:
     """Information on one effect's parameters with a rival's free."""
-    other = information[np.ix_(rival, rival)]
+    other = block(information, rival, rival)
     scale = np.sqrt(np.maximum(np.diag(other), 1e-300))
     inverse = np.linalg.pinv(other / scale[:, None] / scale, rcond=1e-9) / scale[:, None] / scale
-    cross = information[np.ix_(own, rival)]
-    left: Array = information[np.ix_(own, own)] - cross @ inverse @ cross.T
+    cross = block(information, own, rival)
+    left: Array = block(information, own, own) - cross @ inverse @ cross.T
     return left
+
+
+def block(information: Array, rows: Sequence[int], columns: Sequence[int]) -> Array:
+    """Some rows of some columns."""
+    return np.asarray(information[np.asarray(rows)[:, None], np.asarray(columns)])
 
 
 def noncentrality(
@@ -244,10 +259,10 @@ def canonical_correlation(information: Array, own: Sequence[int], rival: Sequenc
     """
     parts = []
     for index in (own, rival):
-        block = information[np.ix_(index, index)]
-        scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-        values, vectors = np.linalg.eigh(block / scale[:, None] / scale)
+        alone = block(information, index, index)
+        scale = np.sqrt(np.maximum(np.diagonal(alone), 1e-300))
+        values, vectors = np.linalg.eigh(alone / scale[:, None] / scale)
         root = np.where(values > LOST, 1.0 / np.sqrt(np.maximum(values, LOST)), 0.0)
         parts.append((vectors * root).T / scale)
-    cross = parts[0] @ information[np.ix_(own, rival)] @ parts[1].T
+    cross = parts[0] @ block(information, own, rival) @ parts[1].T
     return min(float(np.linalg.norm(cross, 2)), 1.0) if cross.size else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import field
 from typing import Final
 
 import numpy as np
@@ -18,6 +19,7 @@ HARDLY: Final = 5.0  # the same of a sigma that is asked: to hold it would take 
 WIDENED: Final = 3.0  # times that one other effect may widen a sigma that is not asked
 TWICE: Final = 2.0  # times what is asked that it may leave
 VAGUE: Final = 30.0  # times the prior: of what a search has not seen yet
+_Places = tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,21 +30,30 @@ class Others:
     index: NDArray[np.int64]
     limit: Array
 
+    _known: dict[tuple[int, ...], _Places] = field(default_factory=dict, repr=False, compare=False)
+
     def widened(self, information: Array, wanted: Sequence[int], vague: Array) -> Array:
         """Sigmas (f, w) of what is wanted with each other effect free."""
-        count, width = self.index.shape[0], len(wanted)
-        size = width + self.index.shape[1]
-        every = np.concatenate([np.tile(wanted, (count, 1)), self.index], axis=1)
-        known = every >= 0
-        both = known[:, :, None] & known[:, None, :]
+        every, known, both = self._places(tuple(wanted))
         parts = np.where(both, information[every[:, :, None], every[:, None, :]], 0.0)
         diagonal = np.einsum("fii->fi", parts)
         diagonal += np.where(known, vague[every] ** -2.0, 1.0)
         scale = np.sqrt(diagonal)
         inverse = np.linalg.inv(parts / scale[:, :, None] / scale[:, None, :])
         variance = np.einsum("fii->fi", inverse) / scale**2
-        assert variance.shape == (count, size)
-        return np.asarray(np.sqrt(np.maximum(variance[:, :width], 0.0)))
+        return np.asarray(np.sqrt(np.maximum(variance[:, : len(wanted)], 0.0)))
+
+    def _places(self, wanted: tuple[int, ...]) -> _Places:
+        """Where what is wanted and each other effect stand (f, w + 3), which of these there are,
+        and which pairs of them; a search asks for the same again and again."""
+        found = self._known.get(wanted)
+        if found is None:
+            count = self.index.shape[0]
+            every = np.concatenate([np.tile(wanted, (count, 1)), self.index], axis=1)
+            known = every >= 0
+            found = every, known, known[:, :, None] & known[:, None, :]
+            self._known[wanted] = found
+        return found
 
     def some(self, kept: NDArray[np.bool_], limit: Array) -> Others:
         """Some of them, with limits of their own."""

@@ -68,11 +68,12 @@ class Room:
 @dataclass(frozen=True, slots=True)
 class Way:
     """One way to drive a leg: which of the four headings it has, the turn to it [rad] and its time
-    [s], and what turn and leg take from where the turn begins."""
+    [s], the leg's own time [s], and what turn and leg take from where the turn begins."""
 
     heading: int
     turn_rad: float
     turn_s: float
+    leg_s: float
     swept: Swept
 
 
@@ -126,9 +127,8 @@ class LegTold:
         turned = round(turn_rad / QUARTER_RAD)
         turn = STILL if self.room is None else self.room.turns[ABOUT + turned]
         begun = turn.begun_at((heading - turned) % 4)
-        return Way(
-            heading, turn_rad, self._turn_s(turn_rad), begun.then(self.swept.begun_at(heading))
-        )
+        swept = begun.then(self.swept.begun_at(heading))
+        return Way(heading, turn_rad, self._turn_s(turn_rad), self.leg.duration_s, swept)
 
     def _turn_s(self, angle_rad: float) -> float:
         """Time of a turn."""
@@ -182,81 +182,89 @@ class LegsEnd:
     def then(self, told: LegTold) -> tuple[Placed, LegsEnd]:
         """One more leg, at the heading that ends nearest to the start, the way back first; within
         its area where some way is."""
+        way, end = self.led_on(told)
+        return Placed(told, way.heading, way.turn_rad, self.end_s + way.turn_s), end
+
+    def led_on(self, told: LegTold) -> tuple[Way, LegsEnd]:
+        """The way that one more leg is driven, and where it leads."""
         ways = told.ways_from(self.heading_rad)
         (north, east), about = self.place_m, self.before + 2
-        costs = [
-            round(
-                math.hypot(north + one.swept.moved_m[0], east + one.swept.moved_m[1])
-                + 1e-6 * ((one.heading - about) % 4),
-                5,
-            )
-            for one in ways
-        ]
+        costs = []
+        for one in ways:
+            more, off = one.swept.moved_m
+            away_m = math.hypot(north + more, east + off)
+            costs.append(round(away_m + 1e-6 * ((one.heading - about) % 4), 5))
         if told.room is None:
-            return self._placed(told, ways[costs.index(min(costs))])
+            return self._after(told, ways[costs.index(min(costs))])
         order = sorted(range(len(ways)), key=costs.__getitem__)
         if self.end_s == 0.0:  # turned to first only where straight on it does not fit
             order.sort(key=lambda k: abs(ways[k].turn_rad))
-        found = (self._placed(told, ways[k]) for k in order)
-        fitting = (one for one in found if one[1].within(told.area_m))
-        return next(fitting, None) or self._placed(told, ways[order[0]])
+        for k in order:
+            found = self._after(told, ways[k])
+            if found[1].within(told.room.area_m):
+                return found
+        return self._after(told, ways[order[0]])
 
     @property
     def extent_m(self) -> Place:
         """North to south and east to west that was taken [m], with the turns between the legs, the
         run-up and the run-out."""
-        north, east = self.place_m
-        run_up: Place = (-self.run_up_m, 0.0)
-        run_out = (
-            north + self.run_m * math.cos(self.heading_rad),
-            east + self.run_m * math.sin(self.heading_rad),
+        south, north, west, east = self.box_m
+        to_north = self.place_m[0] + self.run_m * math.cos(self.heading_rad)
+        to_east = self.place_m[1] + self.run_m * math.sin(self.heading_rad)
+        return (
+            max(north, -self.run_up_m, to_north) - min(south, -self.run_up_m, to_north),
+            max(east, 0.0, to_east) - min(west, 0.0, to_east),
         )
-        return _extent(around(around(self.box_m, run_up, STILL.box_m), run_out, STILL.box_m))
 
     def within(self, area_m: Place | None) -> bool:
         """Whether the drive leaves some room at the edges of an area, which a run-up and a run-out
         may take."""
-        return area_m is None or all(
-            own <= AREA_SHARE * most and whole <= most
-            for own, whole, most in zip(_extent(self.box_m), self.extent_m, area_m, strict=True)
-        )
+        if area_m is None:
+            return True
+        south, north, west, east = self.box_m
+        if north - south > AREA_SHARE * area_m[0] or east - west > AREA_SHARE * area_m[1]:
+            return False
+        whole = self.extent_m
+        return whole[0] <= area_m[0] and whole[1] <= area_m[1]
 
-    def _placed(self, told: LegTold, way: Way) -> tuple[Placed, LegsEnd]:
-        placed = Placed(told, way.heading, way.turn_rad, self.end_s + way.turn_s)
+    def _after(self, told: LegTold, way: Way) -> tuple[Way, LegsEnd]:
         (north, east), (more, off) = self.place_m, way.swept.moved_m
         heading_rad = QUARTER_RAD * way.heading + told.turned_rad
         box = around(self.box_m, self.place_m, way.swept.box_m)
-        return placed, LegsEnd(
+        return way, LegsEnd(
             (north + more, east + off),
             way.heading,
             heading_rad,
-            placed.end_s,
+            self.end_s + way.turn_s + way.leg_s,
             box,
             told.runs_m[1],
             self.run_up_m if self.end_s else told.runs_m[0],
         )
 
 
+BEGIN: Final = LegsEnd()
+
+
 def arranged(sequence: Sequence[LegTold]) -> tuple[Placed, ...]:
     """Every leg at its heading and time."""
-    way, found = LegsEnd(), []
+    way, found = BEGIN, []
     for told in sequence:
         placed, way = way.then(told)
         found.append(placed)
     return tuple(found)
 
 
-def way_of(sequence: Sequence[LegTold]) -> LegsEnd:
-    """Where the legs of a sequence end."""
-    way = LegsEnd()
+def way_of(
+    sequence: Sequence[LegTold], begun: LegsEnd = BEGIN, most_s: float = math.inf
+) -> LegsEnd:
+    """Where the legs of a sequence end, after others; only that it takes longer, where it does."""
+    way = begun
     for told in sequence:
-        way = way.then(told)[1]
+        way = way.led_on(told)[1]
+        if way.end_s > most_s:
+            break
     return way
-
-
-def _extent(box: Box) -> Place:
-    south, north, west, east = box
-    return north - south, east - west
 
 
 def _turned(moved: Place, heading: int) -> Place:

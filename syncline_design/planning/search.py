@@ -20,10 +20,11 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import Deadline
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.effort import Effort
-from syncline_design.planning.information import covariance_of, sigmas
+from syncline_design.planning.information import Flags, block, covariance_of, shifted, sigmas
 from syncline_design.planning.others import TWICE, VAGUE, Others
 from syncline_design.planning.pairs import pair_ratio
 from syncline_design.planning.placing import (
+    BEGIN,
     LegTold,
     Place,
     Placed,
@@ -62,16 +63,25 @@ class PlanJudge:
     def ratios(self, information: Array, exact: bool = False) -> Array:
         """Sigma over tolerance; root of the noncentrality asked over that reached."""
         index = list(self.goal.wanted)
-        sigma = sigmas(information, index, None if exact else VAGUE * self.prior[index])
+        prior = None if exact else VAGUE * self.prior[index]
+        return self._ratios(information, sigmas(information, index, prior))
+
+    def _ratios(self, information: Array, sigma: Array) -> Array:
+        """The same by the sigmas of what is wanted."""
         asked = np.isfinite(self.goal.tolerance)
         own = sigma[asked] / self.goal.tolerance[asked]
         return np.array([*own, *(pair_ratio(information, p) for p in self.goal.pairs)])
 
-    def _shares(self, information: Array) -> Array:
-        """By how much each other effect widens what is wanted, over what it may, (f, w)."""
+    def _wanted(self, information: Array) -> tuple[Array, Flags]:
+        """Covariance of what is wanted, all others known, and which of it is lost."""
+        index = list(self.goal.wanted)
+        return covariance_of(block(information, index, index), VAGUE * self.prior[index])
+
+    def _shares(self, information: Array, covariance: Array) -> Array:
+        """By how much each other effect widens what is wanted, over what it may, (f, w);
+        covariance: of what is wanted, all others known."""
         index = list(self.goal.wanted)
         vague = VAGUE * self.prior
-        covariance, _ = covariance_of(information[np.ix_(index, index)], vague[index])
         widened = self.others.widened(information, index, vague)
         share = widened / np.sqrt(np.diag(covariance)) / self.others.limit
         asked = np.isfinite(self.goal.tolerance)
@@ -91,15 +101,18 @@ class PlanJudge:
 
     def confusions(self, information: Array) -> Array:
         """The largest share of any one other effect, by what is wanted."""
+        return self._confusions(information, self._wanted(information)[0])
+
+    def _confusions(self, information: Array, covariance: Array) -> Array:
         if not len(self.others.index):
             return np.zeros(0)
-        return np.asarray(np.max(self._shares(information), axis=0))
+        return np.asarray(np.max(self._shares(information, covariance), axis=0))
 
     def taken(self, information: Array, k: int) -> tuple[int, float, float]:
         """The other effect that takes most of what is wanted at place k: its own first place, the
         sigma with it free, and what that may be."""
         index = list(self.goal.wanted)
-        shares = self._shares(information)[:, k]
+        shares = self._shares(information, self._wanted(information)[0])[:, k]
         row = int(np.argmax(shares))
         widened = self.others.widened(information, index, VAGUE * self.prior)[row, k]
         return int(self.others.index[row, 0]), float(widened), float(widened / shares[row])
@@ -113,19 +126,22 @@ class PlanJudge:
         if not len(self.others.index):
             return []
         index, vague = list(self.goal.wanted), VAGUE * self.prior
-        covariance, _ = covariance_of(information[np.ix_(index, index)], vague[index])
+        covariance, _ = self._wanted(information)
         widened = self.others.widened(information, index, vague)
         own = widened > TWICE * np.sqrt(np.diag(covariance))
-        beyond = np.any((self._shares(information) > 1.0) & own, axis=1)
+        beyond = np.any((self._shares(information, covariance) > 1.0) & own, axis=1)
         return [int(k) for k in self.others.index[beyond, 0]]
 
     def standing(self, information: Array) -> Standing:
         """How far a plan is from all that is asked; what any one other effect, left free, takes of
         it counts like what is asked."""
-        index = list(self.goal.wanted)
-        every = np.concatenate([self.ratios(information), self.confusions(information)])
-        alone = sigmas(information, index, VAGUE * self.prior[index])
-        whole = sigmas(information, range(len(self.prior)), self.prior)[index]
+        index, count = list(self.goal.wanted), len(self.prior)
+        own = self._wanted(information)
+        alone = shifted(*own, information[index, -1])
+        ratios = self._ratios(information, alone)
+        every = np.concatenate([ratios, self._confusions(information, own[0])])
+        free = covariance_of(information[:count, :count], self.prior)
+        whole = shifted(*free, information[:count, -1])[index]
         return Standing(every, float(np.mean(np.log(np.maximum(whole / alone, 1.0)))))
 
 
@@ -246,8 +262,10 @@ class LegSearch:
     def shortened(self, plan: list[LegTold]) -> list[LegTold]:
         """Legs left out or exchanged for shorter ones while everything stays reached."""
         for _ in range(SWEEPS):
-            trials = [(lasting_s(t), t) for t in (*self._without(plan), *self._exchanged(plan))]
-            shorter = [one for one in trials if one[1] and one[0] < lasting_s(plan) - 1e-6]
+            below_s = lasting_s(plan) - 1e-6
+            trials = [(lasting_s(t), t) for t in self._without(plan)]
+            trials += self._exchanged(plan, below_s)
+            shorter = [one for one in trials if one[1] and one[0] < below_s]
             shorter.sort(key=lambda one: one[0])
             found = next((t for _, t in shorter if self.fits(t) and self.reaches(t)), None)
             if found is None:
@@ -258,21 +276,27 @@ class LegSearch:
     def _without(self, plan: list[LegTold]) -> list[list[LegTold]]:
         return [plan[:k] + plan[k + 1 :] for k in range(len(plan))]
 
-    def _exchanged(self, plan: list[LegTold]) -> list[list[LegTold]]:
+    def _exchanged(
+        self, plan: list[LegTold], most_s: float
+    ) -> Iterator[tuple[float, list[LegTold]]]:
+        """Plans of at most so much time with another leg in the place of one, and their times."""
         if self.is_over:
-            return []
-        return [
-            [*plan[:k], told, *plan[k + 1 :]]
-            for k in range(min(len(plan), MOST_EXCHANGED))
-            for told in self.legs
-            if told is not plan[k]
-        ]
+            return
+        begun = BEGIN
+        for k, own in enumerate(plan[:MOST_EXCHANGED]):
+            for told in self.legs:
+                if told is not own:
+                    rest = [told, *plan[k + 1 :]]
+                    lasts_s = way_of(rest, begun, most_s).end_s
+                    if lasts_s <= most_s:
+                        yield lasts_s, [*plan[:k], *rest]
+            begun = begun.led_on(own)[1]
 
     def bettered(self, plan: list[LegTold], most_s: float) -> list[LegTold]:
         """Exchange of single legs while it brings a plan of at most this time nearer."""
         value = self.value(plan)[1]
         for _ in range(SWEEPS):
-            trials = [t for t in self._exchanged(plan) if lasting_s(t) <= most_s and self.fits(t)]
+            trials = [t for _, t in self._exchanged(plan, most_s) if self.fits(t)]
             values = [self.value(t)[1] for t in trials]
             if not values or min(values) >= value - LEAST_GAIN:
                 break
