@@ -81,6 +81,23 @@ def test_what_receipts_do_not_tell_is_said(seed: int) -> None:
     assert names(one) or (one.hidden is not None and "10 ms" in one.hidden.words)
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("grid_s", "scatter_s"), [(0.002, 1.5e-3), (0.001, 1e-3)])
+def test_pings_that_keep_no_course_are_not_accused(
+    grid_s: float, scatter_s: float, seed: int
+) -> None:
+    """Their own scatter is larger than a grain: nothing tells what the grid would cut off."""
+    rng = np.random.default_rng([239, seed])
+    at = pings(rng, "smooth")
+    at = np.ceil((at + rng.normal(0.0, scatter_s, at.size)) / grid_s) * grid_s
+    receive = received(rng, at, 1e-3)
+    one = of(at, receive)
+    assert names(one) == []
+    assert one.hidden is not None
+    assert one.hidden.seconds == pytest.approx(grid_s)
+    assert one.residual.bound == pytest.approx(float(np.ptp(receive - at)), rel=0.02)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_losses_beside_a_coarse_grid_leave_its_bound_as_it_is(seed: int) -> None:
     """12.7 Hz on 20 ms, one message in fifty missing: counted by their intervals alone."""

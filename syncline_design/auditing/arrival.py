@@ -158,7 +158,7 @@ def _hidden_grid(grain_s: float) -> Hidden | None:
     if not grain_s:
         return None
     return Hidden(grain_s, f"whether its stamps are cut off to {in_words(grain_s)}: its interval "
-                  "changes, it may measure at such moments, and receipts scatter too far to say "
+                  "changes, it may measure at such moments, and receipts do not say "
                   "which")  # fmt: skip
 
 

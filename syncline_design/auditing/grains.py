@@ -80,7 +80,7 @@ def truncated(
         return None
     if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
         return None
-    by = told_by_receipts(series, pace.places, grain / NS)
+    by = told_by_receipts(series, pace, grain / NS)
     return None if by is not None and (by.followed or by.open) else _grain(series, pace, grain)
 
 
@@ -92,7 +92,7 @@ def may_be_cut(series: Series, pace: Cadence) -> float:
         return 0.0
     if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
         return 0.0
-    by = told_by_receipts(series, pace.places, grain / NS)
+    by = told_by_receipts(series, pace, grain / NS)
     return grain / NS if by is not None and by.open else 0.0
 
 

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.coarse_rhythm import counted, evener
 from syncline_design.auditing.local_rhythm import off_course
 from syncline_design.auditing.series import Array, Series, in_words, seconds
@@ -117,14 +118,16 @@ class Told:
         return not self.even and abs(self.sigma) <= _SIGMA
 
 
-def told_by_receipts(series: Series, places: NDArray[np.intp], grain_s: float) -> Told | None:
+def told_by_receipts(series: Series, pace: Cadence, grain_s: float) -> Told | None:
     """Of a smooth course c, w = s - c and delays d: cut-off stamps leave r - s = d - w, those of
     messages that were measured or taken at s leave d.  So r - s changes from message to message by
     what delays do less what w does, or by the first alone: the likelihoods of both, of delays whose
     changes are Laplace's (sums of absolute values), apart by more than chance makes them.
 
-    The course is a + k T, or that of the messages around.  None without one.
+    The course is a + k T, or that of the messages around; without one nothing tells.  None without
+    receipts.
     """
+    places = pace.places
     if series.receive is None or places.size < 2:
         return None
     when = seconds(series.stamp[places] - series.stamp[places[0]])
@@ -133,10 +136,10 @@ def told_by_receipts(series: Series, places: NDArray[np.intp], grain_s: float) -
     waits = None if count is None else count.waits(when)
     even = waits is not None and float(np.ptp(waits)) <= _REACH * grain_s
     pieces = (waits, late) if waits is not None and even else off_course(when, late, grain_s)
+    one_rate = even or rates_apart(np.diff(when), grain_s) < ONE_RATE
     if pieces is None:
-        return None
-    even = even or rates_apart(np.diff(when), grain_s) < ONE_RATE
-    return Told(_nearer(*(np.atleast_2d(piece) for piece in pieces)), even)
+        return Told(0.0, one_rate or pace.regular)
+    return Told(_nearer(*(np.atleast_2d(piece) for piece in pieces)), one_rate)
 
 
 def _nearer(off: Array, late: Array) -> float:
