@@ -20,6 +20,7 @@ from syncline_design.auditing.host_ticks import longest_tick, moved_together, ti
 from syncline_design.auditing.jumps import without_jumps
 from syncline_design.auditing.lasting_jumps import Jump
 from syncline_design.auditing.levels import SURE, believed, polished, shapes_of
+from syncline_design.auditing.locks import without_locks
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.plain_step import without_plain_step
 from syncline_design.auditing.result import StampFault
@@ -66,6 +67,7 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     nothing = Shifts(series, (), (), None)
     if series.receive is None or series.good.sum() < 2:
         return nothing
+    series, locks = without_locks(series, cadence(series), least_s)
     mended = without_jumps(series, cadence(series), least_s)
     series = mended.series
     assert series.receive is not None
@@ -76,7 +78,7 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     own = tuple(_shift_of(jump, time_s) for jump in mended.jumps)
     moved = _slow_shifts(series, places, time_s, late, least_s, mended.settling_s)
     near_s = 2.0 * moved.blocks.length_s if moved.blocks is not None else 0.0
-    faults = _joined(mended.faults, moved.faults, near_s)
+    faults = _joined((*mended.faults, *all_named(locks, time_s)), moved.faults, near_s)
     if moved.blocks is None and not faults:  # few messages
         whole, faults = without_plain_step(moved.series, cadence(series), least_s)
         moved = replace(moved, series=whole)
