@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from syncline_design.diagnosis import diagnose
 from syncline_design.diagnosis.gross import gross_faults
+from syncline_design.diagnosis.mean_turn import least_turn_rad
 from syncline_design.diagnosis.system import measured
 from syncline_design.logs.log import Log
 from syncline_design.spec.load import load
@@ -167,3 +168,25 @@ def test_where_no_way_tells_a_turned_heading_is_said_beside_the_arm(
     np.savetxt(file, table, "%.6f", ",", header=",".join(log), comments="")
     (arm,) = (one for one in diagnose(spec, [file]).findings if one.effect == "lever_arm")
     assert ("a yaw that is off by 180 deg would make the same error" in arm.evidence) is said
+
+
+@pytest.mark.parametrize(("off_rad", "longer", "said"), [(0.12, 1.0, True), (0.0, 1.3, False)])
+def test_attitudes_off_on_the_average_are_said_beside_the_arm_that_they_look_like(
+    off_rad: float, longer: float, said: bool, tmp_path: Path
+) -> None:
+    """A turn of 0.12 rad across the arm moves its end across it; an arm that is longer is none."""
+    log = columns(5, ARM_M * longer, TURNS_ABOUT)
+    across = np.cross(ARM_M, [0.0, 1.0, 0.0]) / np.linalg.norm(ARM_M)
+    turn = Rotation.from_euler(
+        "ZYX", np.stack([log[a] for a in ANGLES[::-1]], axis=1), degrees=True
+    )
+    told = (turn * Rotation.from_rotvec(off_rad * across)).as_euler("ZYX", degrees=True)
+    log |= dict(zip(ANGLES[::-1], told.T, strict=True))
+    spec, file = tmp_path / "spec.yaml", tmp_path / "log.csv"
+    spec.write_text(SPEC, encoding="utf-8")
+    table = np.stack(list(log.values()), axis=1)
+    np.savetxt(file, table, "%.6f", ",", header=",".join(log), comments="")
+    (arm,) = (one for one in diagnose(spec, [file]).findings if one.effect == "lever_arm")
+    assert ("on the average" in arm.evidence) is said
+    turn_rad = least_turn_rad(arm, ARM_M)
+    assert turn_rad is None if not said else turn_rad == pytest.approx(off_rad, abs=0.03)

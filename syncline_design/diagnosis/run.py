@@ -30,6 +30,7 @@ from syncline_design.diagnosis.hanging_rows import Hanging, without_hanging
 from syncline_design.diagnosis.identify import unseen
 from syncline_design.diagnosis.knocks import after_a_knock, within_words, words_for
 from syncline_design.diagnosis.late_part import is_far_off, late_part
+from syncline_design.diagnosis.mean_turn import with_mean_turn
 from syncline_design.diagnosis.mending import mended
 from syncline_design.diagnosis.motion_columns import (
     columns_of,
@@ -330,7 +331,7 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
         material=material,
     )
     named = with_system_delay(with_one_delay(named), data.view.log.kind)
-    named = with_turned_heading(named, data.view)
+    named = with_mean_turn(with_turned_heading(named, data.view), data.view)
     hangs = one.hanging.size_m >= SHARE * weights.spec_m
     return WeighedUp(named, remaining, checks, before, hangs)
 

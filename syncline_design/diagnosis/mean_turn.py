@@ -1,0 +1,64 @@
+"""A lever arm that attitudes off by a constant turn would show as well, in a log of positions.
+
+A small turn a of the measured attitude R exp(S(a)) moves the place of the reference point by
+R (l x a), l the spec's arm, as an arm that is off by d = l x a does: no motion tells the two.  Of d
+across l the least such turn is a = d x l / |l|^2; what is along l no turn makes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from syncline_design.diagnosis.result import Finding
+from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects import registry
+from syncline_design.effects.record import Array
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension
+
+SIZE, ALONG = "mounting", "xyz"
+
+
+def with_mean_turn(named: Sequence[Finding], view: Scene) -> tuple[Finding, ...]:
+    """The findings, an arm of a position log with the turn of the attitudes that it may be."""
+    if view.log.kind != "position" or len(view.system.stages) != 1:
+        return tuple(named)
+    arm_m = np.broadcast_to(view.rows[0].antenna_m, (len(view), 3))[0]
+    return tuple(_with_turn(one, arm_m) if _is_arm(one) else one for one in named)
+
+
+def _is_arm(one: Finding) -> bool:
+    return registry()[one.effect].breaks == "lever_arm" and one.sensor == "position"
+
+
+def _with_turn(one: Finding, arm_m: Array) -> Finding:
+    turn_rad = least_turn_rad(one, arm_m)
+    if turn_rad is None:
+        return one
+    size = format_quantity(turn_rad, Dimension.ANGLE, 2)
+    words = (
+        f"attitudes that are off by {size} on the average would make the same error: look at them "
+        "before the arm is changed"
+    )
+    return replace(one, evidence=f"{one.evidence}; {words}")
+
+
+def least_turn_rad(one: Finding, arm_m: Array) -> float | None:
+    """The least turn that makes the error of an arm; None where none makes it, or none so large."""
+    length2 = float(arm_m @ arm_m)
+    figures = [one.parameters[f"{axis}_m"] for axis in ALONG]
+    reach = [f.interval95 for f in figures]
+    if length2 == 0.0 or any(r is None for r in reach):
+        return None
+    off_m = np.array([float(f.value) for f in figures])
+    half_m = np.array([0.5 * (high - low) for low, high in filter(None, reach)])
+    along = arm_m / math.sqrt(length2)
+    if abs(float(off_m @ along)) > float(np.linalg.norm(along * half_m)):
+        return None
+    turn_rad = float(np.linalg.norm(np.cross(off_m, arm_m))) / length2
+    most = min(p.high for p in registry()[SIZE].parameters)
+    return turn_rad if turn_rad <= most else None
