@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,21 +17,21 @@ from syncline_design.auditing.late_scatter import Waits, long_waits_of, waits_of
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, in_words, seconds, spread
 from syncline_design.auditing.tick_words import Paced
-from syncline_design.logs.readers.stream import PointTimes
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import signed, to_digits
 
 _TIGHT: Final = 0.2  # scatter of receipt minus stamp against that of the stamps' rhythm
 _LEAST_JITTER_S: Final = 5e-6
 _PART: Final = 100  # messages of a part of the log
 _LEAST_PARTS, _MOST_PARTS = 4, 12
 _EVENER: Final = 0.3  # how much more even stamps of the sensor's own are
-_WHOLE_SCANS: Final = 1.25  # how far from its stamp a point of a scan may lie, in scans
 _ONE_TICK: Final = 0.9  # of an interval
 _CLOCKS: Final = 1e-4  # that a sensor's clock and a timer's differ by
 _OUTER: Final = 5.0  # per cent of the messages beyond either end of a scatter's reach
 _OUTERS: Final = (25.0, _OUTER)
 _SKEWED: Final = 0.2  # how much further the late half of the rhythm's scatter reaches
+_OF_ARRIVALS: Final = 0.39  # of gamma delays of shape 2; of n of them
+_FEW: Final = 120  # messages: no rhythm of those around is known
+_CHANCE: Final = 2.7  # over sqrt(n): three times what that differs by
 
 
 def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
@@ -121,11 +121,12 @@ def hidden_in(series: Series, pace: Cadence, ticks: Paced | None = None) -> Hidd
     if series.receive is None or pace.places.size < 40:
         return None
     when = _when(series, pace)
-    transport = _width(seconds((series.receive - series.stamp)[pace.places]))
+    late = seconds((series.receive - series.stamp)[pace.places])
     found = framed(when)
     if found is not None:
         return _hidden_frame(found)
-    told = _hidden_turn(series, pace) or _hidden_wait(when, transport, pace)
+    told = _hidden_turn(series, pace) or _hidden_wait(when, _width(late), pace)
+    told = told or _hidden_arrivals(_about(when, pace), late)
     return told or _hidden_grid(may_be_cut(series, pace))
 
 
@@ -152,6 +153,28 @@ def _hidden_turn(series: Series, pace: Cadence) -> Hidden | None:
     return Hidden(grain / NS, f"whether a timer of {in_words(grain / NS)} stamped it: {few} from "
                   "the others by one such tick, as where a sensor's clock drifts over its edge, "
                   "and receipts follow, as they do what was measured there")  # fmt: skip
+
+
+def _about(when: Array, pace: Cadence) -> Array | None:
+    """How far stamps lie about the rhythm of those around them, of few about a line [s]."""
+    about = about_rhythm(when)
+    if about is not None or not pace.regular or when.size > _FEW:
+        return about
+    count = np.concatenate([[0.0], np.cumsum(pace.steps)])
+    line = np.stack([np.ones(count.size), count], axis=1)
+    return np.asarray(when - line @ np.linalg.lstsq(line, when, rcond=None)[0])
+
+
+def _hidden_arrivals(about: Array | None, late: Array) -> Hidden | None:
+    """Of few messages, whose scatter may be as little one-sided by chance."""
+    if about is None or spread(about) < _LEAST_JITTER_S or not _follow(late, about):
+        return None
+    if _skewness(about) < _OF_ARRIVALS - _CHANCE / float(np.sqrt(about.size)):
+        return None
+    reach = float(np.ptp(about))
+    return Hidden(reach, f"whether it was stamped on arrival: its stamps scatter over "
+                  f"{in_words(reach)} about its rhythm, receipts follow them, and its messages are "
+                  "too few to say whether late rather than early")  # fmt: skip
 
 
 def _hidden_grid(grain_s: float) -> Hidden | None:
@@ -303,9 +326,14 @@ def _range(values: Array, outer: float) -> float:
 
 def _one_sided(about: Array) -> bool:
     """Whether the late half of a scatter reaches further than the early one."""
+    return _skewness(about) > _SKEWED
+
+
+def _skewness(about: Array) -> float:
+    """By how much the late half of a scatter reaches further than the early one, of its reach."""
     low, middle, high = np.percentile(about, [_OUTER, 50.0, 100.0 - _OUTER])
-    reach = high - low
-    return bool(reach > 0.0 and (high - middle) - (middle - low) > _SKEWED * reach)
+    reach = float(high - low)
+    return float((high - middle) - (middle - low)) / reach if reach > 0.0 else 0.0
 
 
 def ahead(series: Series, known_s: float, resolution_s: float) -> StampFault | None:
@@ -330,66 +358,3 @@ def ahead(series: Series, known_s: float, resolution_s: float) -> StampFault | N
         f"{count} of {late.size} stamps lie after their receipt, by up to {in_words(largest)}: "
         "no message comes before it was measured",
     )  # fmt: skip
-
-
-def scan(series: Series, points: PointTimes | None, interval_s: float) -> StampFault | None:
-    """Where in a scan its stamp lies, as the times of its points tell.
-
-    interval_s: between two scans [s].
-    """
-    if points is None or points.last_s - points.first_s <= 0.0:
-        return None
-    length = points.last_s - points.first_s
-    parameters: dict[str, float | str] = {"first_s": points.first_s, "last_s": points.last_s}
-    far = _beyond(points, max(length, interval_s), parameters)
-    if far is not None:
-        return far
-    at_start = abs(points.first_s) < 0.25 * length
-    at_end = abs(points.last_s) < 0.25 * length
-    declared = "start_of_scan" if at_start else "end_of_scan" if at_end else None
-    if declared == "start_of_scan" and _too_early(series, points):
-        return StampFault(
-            "end_of_scan", {**parameters, "kind": "contradicted"}, None, None,
-            f"points reach {to_digits(points.last_s * 1e3, 4)} ms beyond the stamp, but "
-            f"messages come sooner "
-            "than that: the stamp is of the scan's end",
-        )  # fmt: skip
-    if declared is None:
-        return None
-    words = "start" if declared == "start_of_scan" else "end"
-    name = "start_of_scan" if declared == "start_of_scan" else "end_of_scan"
-    return StampFault(
-        name, {**parameters, "kind": "declared"}, None, None,  # type: ignore[arg-type]
-        f"stamps are of the scan's {words}: points from {signed(points.first_s * 1e3, 4)} to "
-        f"{signed(points.last_s * 1e3, 4)} ms", counts=False,
-    )  # fmt: skip
-
-
-def _beyond(
-    points: PointTimes, scan_s: float, parameters: dict[str, float | str]
-) -> StampFault | None:
-    """A stamp that lies outside its own scan: one of start, middle or end has all within scan_s.
-
-    Cut-outs of a scan have fewer points, none of them farther off.
-    """
-    before, after = -points.first_s, points.last_s
-    if max(before, after) <= _WHOLE_SCANS * scan_s:
-        return None
-    name: Literal["end_of_scan", "start_of_scan"] = (
-        "end_of_scan" if before > after else "start_of_scan"
-    )
-    return StampFault(
-        name, {**parameters, "kind": "contradicted"}, None, None,
-        f"points were measured from {signed(points.first_s * 1e3, 4)} to "
-        f"{signed(points.last_s * 1e3, 4)} ms about the stamp, but a scan takes "
-        f"{to_digits(scan_s * 1e3, 4)} ms: at its start, its middle or its end, "
-        "none of its points lies farther off than that",
-    )  # fmt: skip
-
-
-def _too_early(series: Series, points: PointTimes) -> bool:
-    """Whether most messages come before their last point was measured."""
-    if series.receive is None or not series.good.any():
-        return False
-    late = seconds((series.receive - series.stamp)[series.good])
-    return -0.5 < float(np.median(late)) < 0.9 * points.last_s

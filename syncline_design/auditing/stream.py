@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.auditing import arrival, grains, order
+from syncline_design.auditing import arrival, grains, order, scans
 from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import (
     Cadence,
@@ -347,7 +347,7 @@ def _last(
     explained = names & {"whole_second_slip", "counter_wrap", "step", "relock"}
     fall = None if explained else order.remaining_falls(shifted, series)
     found += [fall] if fall is not None and "backward_jump" not in names else []
-    scan = arrival.scan(series, stream.points, pace.period_s)
+    scan = scans.scan(series, stream.points, pace.period_s)
     if scan is not None and not (scan.counts and {f.fault for f in found} & _OFF):
         found.append(scan)
 
