@@ -26,6 +26,7 @@ _LEAST_BLOCKS: Final = 12
 _LAG: Final = 64
 _WALKS: Final = 0.45  # of a block's spread: how far floors differ; of a random walk 1.2
 _ONE_SIDED: Final = 0.55  # floors against ceilings; of a scatter to both sides 1
+_CHANCE: Final = 5.7  # over sqrt(n), in logarithms: 3.5 sigma of two scatters of n edges each
 _SHARP: Final = 0.3  # floors that are the edge of something, such as of a wait for the next turn
 _WALKED: Final = 0.5  # of how far messages reach above their floor
 _MOST_WALKED: Final = 0.02  # of all dozens
@@ -98,7 +99,10 @@ def _over(when: Array, block: int, lag: int) -> Waits | None:
     about = (blocks - middle[:, None]).ravel()
     reach = float(np.percentile(blocks - low[:, None], 99.5))
     edged = floors < _SHARP * width and not _other_rates(low, high - low)
-    return Waits(about, reach, floors < _ONE_SIDED * ceilings, edged)
+    below = _ONE_SIDED
+    if reach < period:  # as a sensor may scatter that is triggered: of few edges by chance
+        below = min(below, float(np.exp(-_CHANCE / np.sqrt(low.size))))
+    return Waits(about, reach, floors < below * ceilings, edged)
 
 
 def _other_rates(low: Array, reach: Array) -> bool:
