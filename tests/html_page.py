@@ -14,7 +14,7 @@ class Page(HTMLParser):
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
-        self.whole = 0  # tags open where a word of an element of its own began
+        self.whole: list[int] = []  # tags open where words of an element of their own began
         self.open: list[str] = []
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.scripts: list[str] = []
@@ -27,9 +27,11 @@ class Page(HTMLParser):
         self.tags.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
-        if (tag, dict(attrs).get("class")) == ("span", "whole"):
+        if tag == "wbr":
             self.texts += [JOINT]
-            self.whole = len(self.open)
+        if tag == "span" and dict(attrs).get("class") in ("whole", "key"):
+            self.texts += [JOINT]
+            self.whole.append(len(self.open))
         if tag == "script":
             self.scripts.append("")
 
@@ -37,9 +39,9 @@ class Page(HTMLParser):
         self.tags.append((tag, dict(attrs)))
 
     def handle_endtag(self, tag: str) -> None:
-        if len(self.open) == self.whole:
+        if [len(self.open)] == self.whole[-1:]:
             self.texts += [JOINT]
-            self.whole = 0
+            self.whole.pop()
         if not self.open or self.open.pop() != tag:
             self.unbalanced.append(tag)
 
@@ -51,7 +53,7 @@ class Page(HTMLParser):
 
     @property
     def text(self) -> str:
-        return re.sub(r"[ \n\t]+", " ", " ".join(self.texts).replace(f" {JOINT} ", ""))
+        return re.sub(r"[ \n\t]+", " ", re.sub(f" ?{JOINT} ?", "", " ".join(self.texts)))
 
     def attribute(self, tag: str, name: str) -> list[str]:
         return [found[name] or "" for t, found in self.tags if t == tag and name in found]

@@ -206,6 +206,23 @@ def test_dark_and_light_follow_the_reader(browser: Any, report: Path) -> None:
     assert found["light"][0] > 0.8 > 0.1 > found["dark"][0]
 
 
+TORN = """() => {
+  const torn = [];
+  document.querySelectorAll("td:not(.lengthy), tbody th").forEach(cell => {
+    const walker = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+    for (let text = walker.nextNode(); text; text = walker.nextNode()) {
+      for (const word of text.data.matchAll(/[\\w.,%\u2212\u00a0]+/g)) {
+        const range = document.createRange();
+        range.setStart(text, word.index); range.setEnd(text, word.index + word[0].length);
+        const tops = new Set([...range.getClientRects()].map(r => Math.round(r.top)));
+        if (tops.size > 1) torn.push(word[0]);
+      }
+    }
+  });
+  return torn;
+}"""
+
+
 def test_print_is_light_and_complete(browser: Any, report: Path) -> None:
     with Opened(browser, report, color_scheme="dark") as opened:
         opened.page.emulate_media(media="print")
@@ -221,6 +238,11 @@ def test_print_is_light_and_complete(browser: Any, report: Path) -> None:
         # else Chromium prints what follows a figure on it
         kinds = "all => [...new Set(all.map(e => getComputedStyle(e).containerType))]"
         assert opened.page.eval_on_selector_all("section, .beneath, .drawing", kinds) == ["normal"]
+        # a button in a head keeps Chromium from printing the head on every sheet
+        buttons = "all => [...new Set(all.map(e => getComputedStyle(e).display))]"
+        assert opened.page.eval_on_selector_all("thead button", buttons) == ["contents"]
+        assert opened.page.eval_on_selector_all(".scroll table", buttons) == ["table"]
+        assert opened.page.evaluate(TORN) == []
         pdf = opened.page.pdf(format="A4")
         assert pdf.startswith(b"%PDF")
         assert 2 <= pdf.count(b"/Type /Page\n") <= 16

@@ -51,7 +51,7 @@
   });
 
   // A table that goes on beyond its frame stands as cards where that is as narrow as a phone, or closer, or says so.
-  var phone = window.matchMedia("(max-width: 34rem)"), tablet = window.matchMedia("(max-width: 55.99rem)"), narrow = 31.5 * 16;
+  var phone = window.matchMedia("screen and (max-width: 34rem)"), tablet = window.matchMedia("screen and (max-width: 55.99rem)"), narrow = 31.5 * 16;
   function cut(frame) { return frame.scrollWidth > frame.clientWidth + 1; }
   function turn(frame, how) {
     if (!cut(frame)) { return; }

@@ -15,7 +15,7 @@ from syncline_design.report import numbers
 from syncline_design.report.columns import padded, worded
 from syncline_design.report.document import Document, Inline, Span, charts, for_output, spans
 from syncline_design.report.layout import laid_out
-from syncline_design.report.table import Table, table
+from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import dated, unbroken, unticked, visible
 
 if TYPE_CHECKING:
@@ -29,10 +29,13 @@ _LINE: Final = 30  # characters of a column that holds sentences
 _TABLET: Final = 100  # characters in a line of a table there
 _PHONE: Final = 48
 _SHORT_KEY: Final = 16  # letters: it stays in one line
+_WORD: Final = 16  # letters of a word that a column of a printed table is as wide as
 _FEW: Final = 16  # lines of a table that is shown whole below its figure
 _BOX: Final = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
 _NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
 _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
+_BRANCH: Final = r"[A-Za-z_]\w*(?:\[[^\]\s]*\])?"
+_PATH: Final = re.compile(rf"((?<![\w./]){_BRANCH}(?:\.{_BRANCH})+)")  # a key of a spec
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 _DOT: Final = re.compile(r"(?<=[\w\]])(?=\.)")
 
@@ -102,11 +105,11 @@ def _environment() -> Environment:
     environment.tests["wide"] = lambda shown: _needed(shown) > _TABLET
     environment.tests["narrow"] = lambda shown: _needed(shown) <= _PHONE
     environment.tests["wordy"] = _is_wordy
+    environment.tests["lengthy"] = _is_lengthy
     environment.tests["few"] = lambda shown: _lines(shown) <= _FEW
     environment.filters["dated"] = dated
     environment.filters["whole"] = _whole
     environment.filters["printed"] = _printed
-    environment.filters["breakable"] = _breakable
     environment.filters["soft"] = _soft
     environment.filters["points"] = _points
     environment.filters["values"] = _values
@@ -129,12 +132,31 @@ def _printed(text: str) -> str:
 
 
 def _whole(text: str) -> Any:
-    """A text in which no line ends at the hyphen of `ACC-1` or `1e-3`."""
+    """A text in which no line ends at the hyphen of `ACC-1` or `1e-3`, long keys end at dots."""
+    from markupsafe import Markup
+
+    parts = _PATH.split(visible(text))
+    parts[::2] = [_named(part) for part in parts[::2]]
+    parts[1::2] = [_breakable(part) for part in parts[1::2]]
+    return Markup("").join(parts)
+
+
+def _named(text: str) -> Any:
     from markupsafe import Markup, escape
 
-    parts = [escape(part) for part in _NAME.split(visible(text))]
+    parts = [escape(part) for part in _NAME.split(text)]
     parts[1::2] = [Markup('<span class="whole">{}</span>').format(part) for part in parts[1::2]]
     return Markup("").join(parts)
+
+
+def _breakable(key: str) -> Any:
+    """A long key path: where no line holds it, it goes on in the next before one of its dots."""
+    from markupsafe import Markup
+
+    if len(key) <= _SHORT_KEY:
+        return _named(key)
+    steps = Markup("<wbr>").join(_named(part) for part in _DOT.split(key))
+    return Markup('<span class="key">{}</span>').format(steps)
 
 
 def _points(figure: InlineChart) -> str:
@@ -197,16 +219,12 @@ def _is_wordy(shown: Table) -> bool:
     return any(len(row[-1].text) > _LINE for row in shown.rows)
 
 
+def _is_lengthy(cell: Cell) -> bool:
+    """Whether a cell holds a word too long for a column of a printed table to be as wide as it."""
+    return any(len(word) > _WORD for word in _printed(cell.text).split(" "))
+
+
 def _soft(text: str) -> str:
     """The same for an attribute that a style sheet shows."""
     whole = _NAME.sub(lambda found: found[0].replace("-", "\N{NON-BREAKING HYPHEN}"), text)
     return "\N{ZERO WIDTH SPACE}".join(_STEP.split(whole))
-
-
-def _breakable(text: str) -> Any:
-    """A long key path, which may go on in the next line before each of its dots."""
-    from markupsafe import Markup
-
-    if len(text) <= _SHORT_KEY:
-        return _whole(text)
-    return Markup("<wbr>").join(_whole(part) for part in _DOT.split(visible(text)))
