@@ -10,7 +10,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.verdict_words import kind_text, margin_text, outcome, waiver_text
-from syncline_design.verdict.obstacle import obstacle_sentence, requirement_name
+from syncline_design.verdict.obstacle import obstacle_sentence, remedies_sentence, requirement_name
 from syncline_design.verdict.tree import (
     Caution,
     Checked,
@@ -129,15 +129,8 @@ def _conflict_text(row: RequirementResult, others: list[str], verdict: Verdict) 
 
 
 def _fixes(verdict: Verdict) -> str:
-    why = verdict.infeasibility
-    if why is None:
-        return ""
-    texts = [fix.text for fix in why.fixes]
-    if texts:
-        lead = "This" if len(texts) == 1 else "Any one of these"
-        return f" {lead} would do: {'; '.join(texts)}."
-    sets = [" and ".join(fix.text for fix in fixes) for fixes in why.joint_fixes]
-    return f" Together these would do: {'; or '.join(sets)}." if sets else ""
+    words = remedies_sentence(verdict.infeasibility)
+    return f" {words}" if words else ""
 
 
 def requirement_sentence(row: RequirementResult) -> str:

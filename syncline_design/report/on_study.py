@@ -83,7 +83,7 @@ def on_study(result: StudyResult) -> Document:
             *section("winners", "Which sensor and method wins where, of the cases that meet",
                      winners, "What wins where"),
             *section("misses", "Which requirements fail",
-                     show(misses_table(summary), silent=True), "What fails"),
+                     _missed(summary), "What fails"),
             *section("ends", "Where feasibility ends", _ends(summary), "Where it ends"),
             *section("fronts", "Cost against error, front by case", _fronts(summary), "Fronts"),
             *section("cases", "Cases", cases),
@@ -279,6 +279,11 @@ def _case_table(summary: StudySummary) -> Table:
     more = len(summary.briefs) - MOST_CASES
     note = f"{more} further cases are in the CSV and Parquet tables." if more > 0 else ""
     return table("All cases", heads, rows, note)
+
+
+def _missed(summary: StudySummary) -> list[Node]:
+    found = misses_table(summary)
+    return show(found, silent=True) or ([Text(found.note)] if found.note else [])
 
 
 def _failing(brief: Brief) -> str:

@@ -60,7 +60,8 @@ def _misses(case: CaseResult) -> Iterator[_Miss]:
     """Everything that a case misses."""
     if case.verdict == "meets":
         return
-    missed = [row for row in case.record.requirements if row.status == "fail" and not row.is_waived]
+    failing = case.record.failing
+    missed = [r for r in case.record.requirements if r.id in failing and not r.is_waived]
     for row in missed:
         sentence = requirement_sentence(row)
         yield _Miss(row.kind, sentence, row.id, row.line, row.column)

@@ -269,9 +269,21 @@ def misses_table(summary: StudySummary) -> Table:
             *_where_cells(several, one.where),
         ])  # fmt: skip
     heads = ["Requirement", "Limits", "Fails in #", "Waived in #", "Waiver", *_at(several)]
+    return table("Which requirements fail", heads, rows, misses_note(summary))
+
+
+def misses_note(summary: StudySummary) -> str:
+    """What counts as failing in a case without a design, and what does not."""
     together = any(brief.verdict == "infeasible" and brief.failing for brief in summary.briefs)
     note = "Of an infeasible case those that no design meets together." if together else ""
-    return table("Which requirements fail", heads, rows, note)
+    unsettled = sum(brief.unsettled for brief in summary.briefs)
+    if not unsettled:
+        return note
+    which = "one case" if unsettled == 1 else f"{numbers.count(unsettled)} cases"
+    return (
+        f"{note} In {which} the time limit was over before it was known which requirements "
+        "stand in the way: not counted."
+    ).strip()
 
 
 def boundary_table(summary: StudySummary, most: int = MOST_ROWS) -> Table:

@@ -91,6 +91,22 @@ class CaseRecord(Record):
         return waived_misses(self.requirements) if self.verdict == "meets" else ()
 
     @property
+    def unsettled(self) -> bool:
+        """Whether the time limit left open which of its requirements stand in the way."""
+        why = self.infeasibility
+        return why is not None and bool(why.conflict.requirements[1:]) and not why.conflict.minimal
+
+    @property
+    def failing(self) -> tuple[str, ...]:
+        """Ids of what its design fails, or of what no design meets together, where that is known.
+
+        Waived ones too.
+        """
+        if self.unsettled:
+            return ()
+        return tuple(row.id for row in self.requirements if row.status == "fail")
+
+    @property
     def expired_waivers(self) -> tuple[str, ...]:
         """Ids of requirements that a case misses and whose waiver is over."""
         missed = (row for row in self.requirements if row.status == "fail" and row.waiver)

@@ -11,7 +11,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.studies.definition import Factor
 from syncline_design.studies.finished import CaseResult, Finished
-from syncline_design.studies.record import CasePoint, CaseRecord, CaseWord, RolePick
+from syncline_design.studies.record import CasePoint, CaseWord, RolePick
 from syncline_design.verdict.tree import RequirementResult
 
 MOST_FRONTS = 500
@@ -35,6 +35,7 @@ class Brief:
     picks: tuple[RolePick, ...]
     failing: tuple[str, ...] = ()  # ids of requirements, waived ones too
     waived: tuple[str, ...] = ()
+    unsettled: bool = False  # the time limit left open which of its requirements fail
 
     @property
     def meets(self) -> bool:
@@ -139,7 +140,7 @@ def summarise(result: Finished) -> StudySummary:
     for case in result.cases():
         briefs.append(_brief(case))
         for row in case.record.requirements:
-            if row.status == "fail":
+            if row.id in briefs[-1].failing:
                 missed.setdefault(row.id, row)
         asked = (row for row in case.record.requirements if row.kind == "accuracy")
         accuracy = accuracy or next(asked, None)
@@ -157,13 +158,9 @@ def _brief(case: CaseResult) -> Brief:
     record = case.record
     return Brief(
         case.number, case.base, tuple(case.labels.values()), record.verdict, record.cost,
-        case.currency, record.error_m, tuple(record.picks), _failing(record), record.waived,
+        case.currency, record.error_m, tuple(record.picks), record.failing, record.waived,
+        record.unsettled,
     )  # fmt: skip
-
-
-def _failing(record: CaseRecord) -> tuple[str, ...]:
-    """What its design fails, or what no design meets together."""
-    return tuple(row.id for row in record.requirements if row.status == "fail")
 
 
 def varied(summary: StudySummary) -> list[tuple[int, Factor]]:

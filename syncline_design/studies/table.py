@@ -9,7 +9,7 @@ from syncline_design.model.unit_table import SI_UNITS
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.finished import CaseResult, Finished
 from syncline_design.studies.record import CaseRecord
-from syncline_design.verdict.obstacle import obstacle_sentence
+from syncline_design.verdict.obstacle import obstacle_sentence, remedies_sentence
 
 FIGURES = (
     "cost", "mass_kg", "power_w", "error_m", "sensor_error_m", "sync_error_m", "tau_s",
@@ -79,7 +79,7 @@ def row(case: CaseResult, units: Mapping[str, str | None]) -> Row:
     for pick in record.picks:
         found[pick.role] = pick.sensor
         found[f"{pick.role} timestamping"] = pick.timestamping
-    found["failing"] = " ".join(one.id for one in record.requirements if one.status == "fail")
+    found["failing"] = " ".join(record.failing)
     found["waived"] = " ".join(record.waived)
     found["not_simulated"] = " ".join(record.not_simulated)
     found["reason"] = reason(case)
@@ -107,10 +107,7 @@ def reason(case: CaseResult) -> str:
     why = record.infeasibility
     if why is None:
         return _undecided(record) if record.verdict == "indeterminate" else ""
-    fixes = [fix.text for fix in why.fixes]
-    lead = "This" if len(fixes) == 1 else "Either" if len(fixes) == 2 else "Any one of these"
-    would = f" {lead} would do: {'; '.join(fixes)}." if fixes else ""
-    return obstacle_sentence(why) + would
+    return " ".join(filter(None, (obstacle_sentence(why), remedies_sentence(why))))
 
 
 def _undecided(record: CaseRecord) -> str:
