@@ -67,7 +67,7 @@ def test_a_study_counts_only_what_is_known_to_fail(
     first: str, minimal: bool, failing: tuple[str, ...]
 ) -> None:
     why = explanation(first, minimal=minimal)
-    record = CaseRecord("infeasible", (row("A"), row("B")), infeasibility=why)
+    record = CaseRecord(verdict="infeasible", requirements=(row("A"), row("B")), infeasibility=why)
     assert record.failing == failing
     brief = SimpleNamespace(
         verdict="infeasible", failing=record.failing, unsettled=record.unsettled

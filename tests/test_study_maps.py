@@ -14,6 +14,7 @@ import pytest
 
 from browsing import Opened
 from study_specs import SPEC, write
+from syncline_design.report.charts_along import over_key
 from syncline_design.report.charts_study import cost_map, sampled_cases
 from syncline_design.report.on_study import on_study
 from syncline_design.report.render_console import console
@@ -27,7 +28,7 @@ from syncline_design.report.study_words import (
     winners_table,
 )
 from syncline_design.studies import StudyResult, StudySettings, run_study
-from syncline_design.studies.scatter import scatter
+from syncline_design.studies.scatter import along, scatter
 from syncline_design.studies.summary import HeatMap, heat_map, summarise
 
 SAMPLE = """\
@@ -170,6 +171,46 @@ def test_a_sample_crossed_with_a_grid_keeps_its_map(tmp_path: Path) -> None:
     heat = heat_map(summarise(result))
     assert heat is not None
     assert (len(heat.x_values), len(heat.y_values)) == (2, 5)
+
+
+ONE = """\
+study: 1
+name: One key
+base: [spec.yaml]
+grid:
+  {key}
+meets_when: decided
+"""
+
+
+@pytest.mark.parametrize(
+    "key",
+    ['"stages[uav].distance": [30 m, 80 m, 500 m]',
+     '"stages[uav].ranging.sensor": [velodyne_hdl32e, riegl_vux1uav]'],
+)  # fmt: skip
+def test_a_study_of_one_key_shows_every_case_over_it(tmp_path: Path, key: str) -> None:
+    """Price and error of each case once a panel; without a design it has a place at the edge."""
+    result = done(tmp_path, ONE.format(key=key))
+    summary = summarise(result)
+    data = along(summary)
+    assert data is not None
+    drawn = over_key(data, "EUR", summary.accuracy, [[("Case", str(b.number))] for b in
+                                                    summary.briefs])  # fmt: skip
+    told = [place.says["Case"] for place in drawn.told]
+    assert sorted(told) == sorted([str(b.number) for b in summary.briefs] * 2)
+    across = bool(data.axis.words)  # words stand below one another, values run to the right
+    for panel in (drawn.told[: len(summary.briefs)], drawn.told[len(summary.briefs) :]):
+        missing = [p for p, b in zip(panel, summary.briefs, strict=True) if b.error_m is None]
+        having = [p for p, b in zip(panel, summary.briefs, strict=True) if b.error_m is not None]
+        for without in missing:
+            assert all(without.left < p.left if across else without.top > p.top for p in having)
+    assert 'id="along"' in html(on_study(result))
+
+
+def test_a_study_of_two_keys_has_no_such_figure(tmp_path: Path) -> None:
+    result = done(tmp_path, GRID.format(across=2, up=2))
+    assert along(summarise(result)) is None
+    assert 'id="along"' not in html(on_study(result))
 
 
 def test_dearer_cells_are_stronger_whatever_the_theme(tmp_path: Path) -> None:

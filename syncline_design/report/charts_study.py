@@ -298,8 +298,8 @@ def _cost_scale(
     figure: Figure, costs: Sequence[float], currency: str, whole: bool = True,
     ends: tuple[float, float] = CELL,
 ) -> None:  # fmt: skip
-    """Patches from the cheapest to the dearest, labelled; nothing where all cost the same."""
-    if len(set(costs)) < 2:
+    """Patches from the cheapest to the dearest, labelled."""
+    if not costs:
         return
     from matplotlib.patches import Rectangle
 

@@ -7,7 +7,7 @@ from functools import partial
 
 from syncline_design import __version__
 from syncline_design.machine.sentences import sentence_list
-from syncline_design.report import charts_study, numbers
+from syncline_design.report import charts_along, charts_study, numbers
 from syncline_design.report.document import (
     Chart,
     Document,
@@ -44,7 +44,7 @@ from syncline_design.report.words import OUTCOMES
 from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import StudyResult
-from syncline_design.studies.scatter import Scatter, scatter
+from syncline_design.studies.scatter import Scatter, along, scatter
 from syncline_design.studies.summary import (
     Brief,
     HeatMap,
@@ -80,6 +80,7 @@ def on_study(result: StudyResult) -> Document:
         sections=(
             *section("heat", LEAST_COST, _heat(summary), "Least cost"),
             *section("sampled", "Sample", _sampled(summary)),
+            *section("along", _along_heading(summary), _along(summary), "One by one"),
             *section("winners", "Which sensor and method wins where, of the cases that meet",
                      winners, "What wins where"),
             *section("misses", "Which requirements fail",
@@ -139,6 +140,32 @@ def _sampled(summary: StudySummary) -> list[Node]:
         return charts_study.sampled_cases(found, currency, says)
 
     return [Chart("sampled", draw, _sampled_caption(found))]
+
+
+def _along_heading(summary: StudySummary) -> str:
+    keys = [short_key(factor.key) for _, factor in varied(summary)]
+    return f"Price and error over {visible(sentence_list(keys))}"
+
+
+def _along(summary: StudySummary) -> list[Node]:
+    """Every case over the one key that varies."""
+    currency, *others = summary.currencies
+    found = along(summary)
+    if others or found is None:
+        return []
+    bases = summary.result.study.bases
+    named = [[("Base", visible(bases[b.base].name))] if bases[1:] else [] for b in summary.briefs]
+
+    def draw() -> InlineChart:
+        several = varied(summary)
+        says = [[*base, *_says(b, several, summary.accuracy)]
+                for base, b in zip(named, summary.briefs, strict=True)]  # fmt: skip
+        return charts_along.over_key(found, currency, summary.accuracy, says)
+
+    caption = "What each case chose, only where a case was computed."
+    if any(point.error_m is None for point in found.points):
+        caption += " Along the edge: no design, or none that is known."
+    return [Chart("along", draw, caption)]
 
 
 def _says(

@@ -119,3 +119,47 @@ def _place(axis: ScatterAxis, text: str) -> float:
     if axis.words:
         return float(axis.words.index(text))
     return float(plain_scalar(text.partition(" ")[0]))
+
+
+@dataclass(frozen=True, slots=True)
+class AlongPoint:
+    """One case: where its value lies, how it ended, what its design costs and how far it errs.
+
+    kind: the place of its base, 0 where these are too many to be told apart.
+    """
+
+    place: float
+    verdict: str
+    cost: float | None
+    error_m: float | None
+    kind: int
+
+
+@dataclass(frozen=True, slots=True)
+class Along:
+    """Every case of a study in which one key varies; kinds: the names of its bases, if a few."""
+
+    axis: ScatterAxis
+    points: tuple[AlongPoint, ...]
+    kinds: tuple[str, ...]
+
+
+def along(summary: StudySummary) -> Along | None:
+    """The cases over the only key that varies; None where more do, or where none has a design."""
+    several = varied(summary)
+    if len(several) != 1 or all(brief.error_m is None for brief in summary.briefs):
+        return None
+    [(column, factor)] = several
+    axis, names = _axis(factor), tuple(base.name for base in summary.result.study.bases)
+    kinds = names if 1 < len(names) <= MOST_KINDS else ()
+    points = (
+        AlongPoint(
+            _place(axis, brief.labels[column]),
+            brief.verdict,
+            brief.cost,
+            brief.error_m,
+            brief.base if kinds else 0,
+        )
+        for brief in summary.briefs
+    )
+    return Along(axis, tuple(points), kinds)
