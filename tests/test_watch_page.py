@@ -131,3 +131,21 @@ def test_evidence_is_told_in_one_way() -> None:
     ]
     assert told == ["0.78", "40", "990", "1.0e+03", "1.1e+05", "3.5e+07", "4.5e+44",
                     "more than 1e+299"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("parameter", "size", "unit", "per_unit"),
+    [("rate", 1.3e-6, "ppm", 1e6), ("rate_radps", 3e-7, "deg/h", 3600.0 * 180.0 / np.pi),
+     ("scale", 0.25, "", 1.0), ("rate_mps", 4e-4, "mm/s", 1e3), ("latency_s", 4e-3, "ms", 1e3)],
+)  # fmt: skip
+def test_a_value_is_told_in_a_unit_that_leaves_no_zeros_before_it(
+    parameter: str, size: float, unit: str, per_unit: float
+) -> None:
+    values = [RunValue("clock_drift", "attitude", "usv", parameter, 0.8 * size, 0.1 * size,
+                       (0.6 * size, size))]  # fmt: skip
+    runs = [cast(WatchedRun, SimpleNamespace(run=1, values=values))]
+    drawn = courses(runs, [("clock_drift", "attitude", "usv", parameter)], {})
+    told, _, named = drawn.told[0].says["Value"].partition(" ")
+    assert named == unit
+    assert float(told) == pytest.approx(0.8 * size * per_unit, rel=0.06)
+    assert not told.startswith("0.00")

@@ -150,24 +150,30 @@ def _key(one: RunValue) -> Key:
     return one.effect, one.sensor, one.stage, one.parameter
 
 
+_BARE: Final = (("", 1.0),)
+_UNITS: Final = {  # of a parameter's last word: names with their sizes, the largest first
+    "s": (("s", 1.0), ("ms", 1e-3), ("\u00b5s", 1e-6)),
+    "m": (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3)),
+    "mps": (("m/s", 1.0), ("mm/s", 1e-3)),
+    "rad": (("deg", math.pi / 180.0),),
+    "radps": (("deg/s", math.pi / 180.0), ("deg/h", math.pi / 648e3)),
+} | dict.fromkeys(("rate", "scale", "error"), (("", 1e-2), ("ppm", 1e-6)))  # bare from 0.01 on
+
+
 def _scale(intervals: Sequence[Sequence[float]], parameter: str) -> tuple[float, str]:
     """A unit in which the values are easy to read: `ms` of `latency_s`."""
     size = max((abs(end) for one in intervals for end in one), default=0.0)
-    suffix = parameter.rpartition("_")[2]
-    for unit, factor, name in (("s", 1.0, "s"), ("s", 1e-3, "ms"), ("s", 1e-6, "\u00b5s"),
-                               ("m", 1.0, "m"), ("m", 1e-2, "cm"), ("m", 1e-3, "mm"),
-                               ("rad", math.pi / 180.0, "deg")):  # fmt: skip
-        if suffix == unit and (size >= factor or name in ("\u00b5s", "mm", "deg")):
-            return factor, name
-    power = 10.0 ** math.floor(math.log10(size)) if size > 0.0 else 1.0
-    exponent = round(math.log10(power))
-    return (1.0, suffix if suffix == "radps" else "") if -2 <= exponent <= 3 else (
-        power, f"1e{exponent}{' rad/s' if suffix == 'radps' else ''}")  # fmt: skip
+    ladder = _UNITS.get(parameter.rpartition("_")[2], ())
+    name, factor = next((one for one in ladder if size >= one[1]), (ladder or _BARE)[-1])
+    exponent = math.floor(math.log10(size)) if size > 0.0 else 0
+    if not name and not -2 <= exponent <= 3:
+        return 10.0**exponent, f"1e{exponent}"
+    return (factor, name) if name else (1.0, "")
 
 
 def _of_words(scale: float, unit: str) -> tuple[float, str]:
     """The same for words: no power of ten stands for a unit there."""
-    return (1.0, unit.partition(" ")[2]) if unit.startswith("1e") else (scale, unit)
+    return (1.0, "") if unit.startswith("1e") else (scale, unit)
 
 
 def by_log(logs: Sequence[PerLog], common: Mapping[str, Estimate], name: str) -> InlineChart:
