@@ -269,7 +269,7 @@ def _tau_row(axes: Axes, row: int, bar: TauBar, low: float, high: float) -> None
     crit = bar.tau_crit_s or high
     axes.barh(row, high - low, left=low, height=0.5, color=SHADE, zorder=1)
     axes.barh(row, end - low, left=low, height=0.5, color=colour, zorder=2)
-    used = [("Used", numbers.percent(bar.tau_s / bar.tau_crit_s))] if bar.tau_crit_s else []
+    used = [("Used", numbers.percent(bar.tau_s / bar.tau_crit_s, 4))] if bar.tau_crit_s else []
     tell(axes, (low, end), (row - 0.25, row + 0.25),
          [("Sensor", bar.label), ("\u03c4", numbers.time(bar.tau_s)),
           ("\u03c4_crit", numbers.time_limit(bar.tau_crit_s)), *used])  # fmt: skip
