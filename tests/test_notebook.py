@@ -115,6 +115,15 @@ def test_a_cell_is_read_in_the_notebooks_own_theme(
         assert found["violations"] == []
 
 
+def test_a_front_that_was_asked_for_is_drawn_and_comes_first() -> None:
+    drawn = sd.optimize(ROOT / "specs" / "uav_corridor.yaml", pareto=True)._repr_html_() or ""
+    assert drawn.count("<svg") == 1
+    assert drawn.index("<svg") < drawn.index("Best designs")
+    plain = sd.optimize(ROOT / "specs" / "uav_corridor.yaml")._repr_html_() or ""
+    assert "<svg" not in plain
+    assert "Best designs" in plain
+
+
 def test_what_a_user_wrote_stays_text(tmp_path: Path) -> None:
     text = (ROOT / "specs" / "position_track.yaml").read_text(encoding="utf-8")
     spec = tmp_path / "own.yaml"

@@ -7,13 +7,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 from syncline_design.report import numbers
-from syncline_design.report.document import Document, Outcome, section, show
+from syncline_design.report.document import Chart, Document, Node, Outcome, section, show
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import with_waived
 from syncline_design.report.words import OUTCOMES
 
 if TYPE_CHECKING:
     from syncline_design.diagnosis.result import Finding
+    from syncline_design.report.svg import InlineChart
     from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
     from syncline_design.verdict.optimization import Optimization
 
@@ -65,6 +66,9 @@ def on_optimization(result: Optimization) -> Document:
     currency = result.designs[0].design.currency if result.designs else ""
     designs = _designs("Best designs", result.designs, currency)
     front = _designs("Exact front", result.front or (), currency)
+    drawn = _front_chart(result, currency)
+    exact = section("front", "Exact front, all requirements met but accuracy",
+                    [*drawn, *show(front, silent=True)])  # fmt: skip
     said = () if result.message is None else (result.message,)
     return Document(
         family="Optimization",
@@ -73,9 +77,9 @@ def on_optimization(result: Optimization) -> Document:
         sentences=said,
         facts=(),
         sections=(
+            *(exact if drawn else []),  # a notebook opens what comes first
             *section("designs", "Best designs", show(designs, silent=True)),
-            *section("front", "Exact front, all requirements met but accuracy",
-                     show(front, silent=True)),
+            *([] if drawn else exact),
         ),
         source=result.spec.file,
     )  # fmt: skip
@@ -84,19 +88,52 @@ def on_optimization(result: Optimization) -> Document:
 def _designs(
     caption: str, designs: Sequence[RankedDesign | FrontDesign], currency: str
 ) -> Table | None:
+    weighed = any(one.mass is not None for one in designs)
     rows = [
         (
             Cell(str(place), float(place)),
             Cell("-" if one.cost is None else numbers.money(one.cost, currency), one.cost),
-            Cell(numbers.in_unit(one.mass, "kg"), one.mass),
-            Cell(numbers.in_unit(one.power, "W"), one.power),
+            *(_weights(one) if weighed else ()),
             Cell(numbers.length(one.error_m), one.error_m),
             _payload(one.design),
         )
         for place, one in enumerate(designs, 1)
     ]
-    heads = ("Place #", "Cost #", "Mass #", "Power #", "Error #", "Payload")
+    weights = ("Mass #", "Power #") if weighed else ()
+    heads = ("Place #", "Cost #", *weights, "Error #", "Payload")
     return table(caption, heads, rows) if rows else None
+
+
+def _weights(one: RankedDesign | FrontDesign) -> tuple[Cell, Cell]:
+    mass, power = numbers.in_unit(one.mass, "kg"), numbers.in_unit(one.power, "W")
+    return Cell(mass, one.mass), Cell(power, one.power)
+
+
+def _front_chart(result: Optimization, currency: str) -> list[Node]:
+    """The exact front as a staircase, the best design on it; nothing of a single price."""
+    best = result.designs[0] if result.designs else None
+    marks = [
+        (
+            one.cost,
+            one.error_m,
+            best is not None and one.design == best.design,
+            _payload(one.design),
+        )
+        for one in result.front or ()
+        if one.cost is not None and one.error_m
+    ]
+    if len(marks) < 2:
+        return []
+
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_front import FrontMark, pareto_front
+
+        drawn = [FrontMark(*mark) for mark in sorted(marks, key=lambda mark: mark[0])]
+        over = result.front_figure or "error"
+        return pareto_front(drawn, currency, None, None, over=over)
+
+    caption = "Every design on the line is the cheapest with that error; nothing lies below it."
+    return [Chart("front", draw, caption)]
 
 
 def _payload(design: NamedDesign) -> str:
