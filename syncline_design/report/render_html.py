@@ -32,7 +32,9 @@ _SHORT_KEY: Final = 16  # letters: it stays in one line
 _WORD: Final = 16  # letters of a word that a column of a printed table is as wide as
 _FEW: Final = 16  # lines of a table that is shown whole below its figure
 _BOX: Final = re.compile(r'viewBox="\S+ \S+ (\S+) (\S+)"')
-_NAME: Final = re.compile(r"\b([\w.]{1,12}(?:-\d\w{0,8})+)\b")  # an id, a type, a power of ten
+_NAME: Final = re.compile(  # an id, a type, a power of ten, `u-blox`
+    r"\b([\w.]{1,12}(?:-\d\w{0,8})+|[A-Za-z]-[a-z]{2,9})\b"
+)
 _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _BRANCH: Final = r"[A-Za-z_]\w*(?:\[[^\]\s]*\])?"
 _PATH: Final = re.compile(rf"((?<![\w./]){_BRANCH}(?:\.{_BRANCH})+)")  # a key of a spec
