@@ -14,7 +14,7 @@ from syncline_design.report.study_words import COMBINED, short_key
 from syncline_design.report.svg import InlineChart, draw, tell
 from syncline_design.report.text import shortened
 from syncline_design.report.words import BRIEF
-from syncline_design.studies.scatter import LOG_SPAN, Along
+from syncline_design.studies.scatter import LOG_SPAN, KeySweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,11 @@ class _Group:
 
 
 def over_key(
-    data: Along, currency: str, limit: numbers.Limited | None, says: Says, name: str = "fig-along"
+    data: KeySweep,
+    currency: str,
+    limit: numbers.Limited | None,
+    says: Says,
+    name: str = "fig-along",
 ) -> InlineChart:
     """Prices, and errors, of all cases over one key; those without a design along the edge.
 
@@ -86,7 +90,7 @@ def over_key(
     return draw(name, f"Price and error over {key}", spoken, (WIDTH, height), build)
 
 
-def _panel(axes: Axes, data: Along, panel: _Panel, says: Says) -> None:
+def _panel(axes: Axes, data: KeySweep, panel: _Panel, says: Says) -> None:
     """One panel: where a case has the value, and along its edge where it has none."""
     across: Literal["x", "y"] = "x" if data.axis.words else "y"
     (axes.set_xscale if across == "x" else axes.set_yscale)("log" if panel.log else "linear")
@@ -129,7 +133,7 @@ def _linear_ticks(low: float, high: float) -> list[float]:
     return [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]
 
 
-def _groups(data: Along) -> list[_Group]:
+def _groups(data: KeySweep) -> list[_Group]:
     """The cases by how they ended, those that meet by their base as well."""
     found = []
     for kind in sorted({p.kind for p in data.points if p.verdict == "meets"}):
@@ -144,7 +148,7 @@ def _groups(data: Along) -> list[_Group]:
     return found
 
 
-def _key_axis(axes: Axes, data: Along) -> None:
+def _key_axis(axes: Axes, data: KeySweep) -> None:
     """The values of the key: figures below, words beside."""
     axis = data.axis
     label = shortened(short_key(axis.key), 60) + (f" [{axis.unit}]" if axis.unit else "")

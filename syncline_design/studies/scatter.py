@@ -122,7 +122,7 @@ def _place(axis: ScatterAxis, text: str) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class AlongPoint:
+class SweptCase:
     """One case: where its value lies, how it ended, what its design costs and how far it errs.
 
     kind: the place of its base, 0 where these are too many to be told apart.
@@ -136,15 +136,15 @@ class AlongPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Along:
+class KeySweep:
     """Every case of a study in which one key varies; kinds: the names of its bases, if a few."""
 
     axis: ScatterAxis
-    points: tuple[AlongPoint, ...]
+    points: tuple[SweptCase, ...]
     kinds: tuple[str, ...]
 
 
-def along(summary: StudySummary) -> Along | None:
+def along(summary: StudySummary) -> KeySweep | None:
     """The cases over the only key that varies; None where more do, or where none has a design."""
     several = varied(summary)
     if len(several) != 1 or all(brief.error_m is None for brief in summary.briefs):
@@ -153,7 +153,7 @@ def along(summary: StudySummary) -> Along | None:
     axis, names = _axis(factor), tuple(base.name for base in summary.result.study.bases)
     kinds = names if 1 < len(names) <= MOST_KINDS else ()
     points = (
-        AlongPoint(
+        SweptCase(
             _place(axis, brief.labels[column]),
             brief.verdict,
             brief.cost,
@@ -162,4 +162,4 @@ def along(summary: StudySummary) -> Along | None:
         )
         for brief in summary.briefs
     )
-    return Along(axis, tuple(points), kinds)
+    return KeySweep(axis, tuple(points), kinds)
