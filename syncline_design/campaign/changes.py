@@ -353,7 +353,7 @@ class Changes(RunSums):
     ) -> Iterator[Runs]:
         """Runs that do not differ beside a change that went back, beside the likeliest or alone,
         where that is likelier than any effect that differs from run to run."""
-        for known, runs in ((off, found), ((), first)):
+        for known, runs in ((off, found), ((), first)) if off else (((), first),):
             one = passing_change(self.parts, self.part_groups, runs.parts)
             if one is None:
                 continue
