@@ -41,7 +41,7 @@ class OnPaper:
     def meets(self, entries: Sequence[EffectChoice] = ()) -> bool:
         """Whether the spec with these effects still meets its requirements."""
         in_force().check()
-        settings = CheckSettings(seed=self.seed, monte_carlo=self._simulates)
+        settings = CheckSettings(seed=self.seed, monte_carlo=self._simulates, brief=True)
         return check_loaded(with_effects(self.case, entries), settings).verdict == "meets"
 
     @cached_property
