@@ -14,7 +14,7 @@ from typer import Typer
 from typer.testing import CliRunner
 
 import command as commands
-from syncline_design.cli.app import app, called
+from syncline_design.cli.app import app, called, each_output
 
 ROOT = Path(__file__).resolve().parent.parent
 TRACK, USV = "specs/position_track.yaml", "specs/usv_mapping.yaml"
@@ -161,3 +161,21 @@ def test_a_command_alone_is_the_command_among_all() -> None:
         assert alone.output == among.output
     for arguments in ([], ["--version"], ["chek"], ["--", "check"]):
         assert called(arguments) is app
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("a.yaml -o svg:a png:b -q", "a.yaml -o svg:a -o png:b -q"),
+     ("--output=svg:a png:b a.yaml", "--output=svg:a -o png:b a.yaml"),
+     ("-ojson html:b sarif:c", "-ojson -o html:b -o sarif:c"),
+     ("-o json a.yaml html:b", "-o json a.yaml html:b"),
+     ("json:a -o html", "json:a -o html"), ("-o html:a b:c", "-o html:a b:c"), ("", "")],
+)  # fmt: skip
+def test_one_option_takes_several_outputs(given: str, meant: str) -> None:
+    assert each_output(given.split()) == meant.split()
+
+
+def test_a_file_that_is_there_is_no_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("png:b").write_text("a log with a strange name")
+    assert each_output(["-o", "svg:a", "png:b"]) == ["-o", "svg:a", "png:b"]

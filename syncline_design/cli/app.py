@@ -10,6 +10,7 @@ import gc
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -30,7 +31,9 @@ from syncline_design.cli import (
 from syncline_design.cli.shared import NO_VERDICT
 from syncline_design.machine.processes import forget_working_folder
 from syncline_design.machine.streams import say, secure_streams
+from syncline_design.report.formats import EVERY_FORMAT
 
+OUTPUT = ("-o", "--output")
 COMPLETION = "_SYNCLINE_DESIGN_COMPLETE"  # a shell's question: source_bash, complete_bash, ...
 
 
@@ -50,6 +53,9 @@ class _Command(TyperCommand):
     several, yet what is copied from there is one call again.
     """
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        return super().parse_args(ctx, each_output(args))
+
     def format_help(self, ctx: Any, formatter: Any) -> None:
         super().format_help(ctx, formatter)
         words: list[str] = []
@@ -58,6 +64,24 @@ class _Command(TyperCommand):
             ctx = ctx.parent
         name = " ".join(words)
         typer.echo(f" Example: syncline-design {name} {EXAMPLES[name]}\n")
+
+
+def each_output(args: list[str]) -> list[str]:
+    """`-o svg:a png:b` as `-o svg:a -o png:b`, where `png:b` is no file that is there."""
+    found: list[str] = []
+    for argument in args:
+        before = found[-2:]
+        after_output = before[:-1] in ([one] for one in OUTPUT) or _is_output(before[-1:])
+        form, colon, _ = argument.partition(":")
+        if after_output and colon and form in EVERY_FORMAT and not Path(argument).exists():
+            found.append(OUTPUT[0])
+        found.append(argument)
+    return found
+
+
+def _is_output(before: list[str]) -> bool:
+    """Whether the argument before holds option and value in one: `-ohtml`, `--output=html`."""
+    return any(one.startswith(("-o", "--output=")) and one not in OUTPUT for one in before)
 
 
 app = typer.Typer(

@@ -22,6 +22,9 @@ GEODETIC_FORMATS: Final = ("kml", "qgc")  # of a plan: they need an origin on th
 WATCH_FORMATS: Final = ("json", "html", "markdown")
 CATALOG_FORMATS: Final = ("json",)
 CHART_FORMATS: Final = ("svg", "png")  # of subjects with charts: a file each, into a folder
+EVERY_FORMAT: Final = frozenset((
+    *CHECK_FORMATS, *STUDY_FORMATS, *DIFF_FORMATS, *PLAN_FORMATS, *LOG_FORMATS, *CHART_FORMATS,
+))  # fmt: skip
 PICTURED: Final = ("html", *CHART_FORMATS)  # what shows charts
 
 NEXT_TO_TEXT: Final = ("junit", "sarif", "github")  # tell no other designs than the chosen one
