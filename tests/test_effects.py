@@ -319,8 +319,8 @@ OTHER_MEANING = {"lever_arm", "sound_speed"}
 ASSUMPTIONS = {"latency", "mounting"}
 SPEAK_OF_ASSUMPTIONS = {
     "acceptance.py", "assumptions.py", "by_log.py", "by_scatter.py", "by_shift.py", "instead.py",
-    "knocks.py", "log_evidence.py", "sarif.py", "stretches.py", "suspects.py", "undone.py",
-    "whole_delay.py",
+    "knocks.py", "log_evidence.py", "mean_turn.py", "sarif.py", "stretches.py", "suspects.py",
+    "undone.py", "whole_delay.py",
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from syncline_design.effects.record import Array
 from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import Dimension
 
-SIZE, ALONG = "mounting", "xyz"
+BROKEN, ALONG = "mounting", "xyz"  # the assumption that such a turn breaks
 
 
 def with_mean_turn(named: Sequence[Finding], view: Scene) -> tuple[Finding, ...]:
@@ -60,5 +60,6 @@ def least_turn_rad(one: Finding, arm_m: Array) -> float | None:
     if abs(float(off_m @ along)) > float(np.linalg.norm(along * half_m)):
         return None
     turn_rad = float(np.linalg.norm(np.cross(off_m, arm_m))) / length2
-    most = min(p.high for p in registry()[SIZE].parameters)
+    turns = (one for one in registry().values() if one.breaks == BROKEN)
+    most = min(p.high for turn in turns for p in turn.parameters)
     return turn_rad if turn_rad <= most else None
