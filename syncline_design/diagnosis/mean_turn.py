@@ -60,6 +60,15 @@ def least_turn_rad(one: Finding, arm_m: Array) -> float | None:
     if abs(float(off_m @ along)) > float(np.linalg.norm(along * half_m)):
         return None
     turn_rad = float(np.linalg.norm(np.cross(off_m, arm_m))) / length2
-    turns = (one for one in registry().values() if one.breaks == BROKEN)
-    most = min(p.high for turn in turns for p in turn.parameters)
-    return turn_rad if turn_rad <= most else None
+    return turn_rad if turn_rad <= _most_rad() else None
+
+
+def _most_rad() -> float:
+    """How far a mounting may be turned before the log is taken for something else."""
+    names = [f"{axis}_rad" for axis in ALONG]
+    return min(
+        parameter.high
+        for one in registry().values()
+        if one.breaks == BROKEN and [p.name for p in one.parameters] == names
+        for parameter in one.parameters
+    )
