@@ -15,13 +15,14 @@ from scipy.spatial.transform import Rotation
 from diagnosis_samples import LATENCY
 from fitted_data import data_from
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
-from syncline_design.diagnosis.candidates import candidates, signatures
+from syncline_design.diagnosis.candidates import candidates, signatures, zero_values
 from syncline_design.diagnosis.fitting import Data, finely, fit
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.noise import as_specified, first_guess, precision, spec_bounds
 from syncline_design.diagnosis.noise_fit import Packing, mean_share, mean_share_slope
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.run import outcome
+from syncline_design.diagnosis.settling import valued
 from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.sufficient import sufficient
 from syncline_design.machine.linear_algebra import one_thread
@@ -219,6 +220,23 @@ def test_intervals_cover_in_foreign_noise(tmp_path: Path) -> None:
         ]
         good += sum(inside) >= 3
     assert good >= 6
+
+
+def test_what_effects_took_of_slow_noise_is_in_their_intervals(tmp_path: Path) -> None:
+    """A minute of sensors whose noise is nearly all slow, five effects fitted that are not there:
+    beyond two uncertainties in one of ten values (one of seven, were courses as small as what is
+    left of them)."""
+    five = (("mounting", "attitude"), ("lever_arm", "position"), ("heading_drift", "attitude"),
+            ("range_bias", "ranging"), ("latency", "position"))  # fmt: skip
+    wander, off = Noise(wander_share=0.9, wander_time_s=15.0), []
+    for seed in range(16):
+        log = make_log(scenario("car_stops", 4000 + seed, 60.0, 5.0), (), wander)
+        data = data_from(log, tmp_path)
+        chosen = {c.label[:2]: c for c in candidates(data.view)}
+        model = fit(data, [chosen[e].acting(zero_values(chosen[e].effect)) for e in five])
+        _, own = valued(data, model, slow_states(data))
+        off += [abs(z) for one in own for z in one.values / one.spread]
+    assert np.mean(np.array(off) > 2.0) < 0.11
 
 
 def test_a_constant_within_slow_noise_is_not_sure(tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ def settle(
         if weakest is None or evidence[weakest].log_p <= threshold(less[weakest]):
             break
         model = less[weakest]
-    model, own = _valued(data, model, states)
+    model, own = valued(data, model, states)
     judged = dict(zip((a.label for a in model.acting), own, strict=True))
     ran = zip((a.label for a in model.acting), states.courses_of(model), strict=True)
     stairs = _stairs(data, model, evidence)
@@ -106,13 +106,13 @@ def settle(
     )  # fmt: skip
 
 
-def _valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judged]]:
+def valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judged]]:
     """The model with the values to report, and what is said of them.
 
     Where a value by the fitted noise is further from the robust one than noise of the model's kind
     would put it, the noise is of another kind, and all values are the robust ones.
     """
-    own = states.own(model)
+    own = states.own(model, freed=True)
     for _ in range(ROUNDS):
         off = [np.abs(one.values - fitted_of(a)) for a, one in zip(model.acting, own, strict=True)]
         if not any(np.any(o > APART * j.spread) for o, j in zip(off, own, strict=True)):
@@ -126,7 +126,7 @@ def _valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judge
         error = data.error(moved)
         nll = model.precision.negative_log_likelihood(error)
         model = replace(model, acting=moved, error=error, nll=nll)
-        own = states.own(model)
+        own = states.own(model, freed=True)
     return model, own
 
 

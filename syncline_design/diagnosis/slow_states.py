@@ -100,13 +100,17 @@ class States:
         known = () if self.explained is None else (self.explained,)
         return replace(self, explained=np.concatenate([*known, *columns], axis=2))
 
-    def own(self, model: Model) -> list[Judged]:
+    def own(self, model: Model, *, freed: bool = False) -> list[Judged]:
         """The model's own effects, all together: one entry for each, marginal over the others.
 
         Slow courses are sized beside these alone: what else effects could make is not there.
+        freed: by restricted likelihood, since what the effects took of the noise was there too.
         """
         columns = np.nan_to_num(slopes(self.data.view, model.acting))
-        none, states = np.zeros((*columns.shape[:2], 0)), replace(self, explained=None)
+        none, states = (
+            np.zeros((*columns.shape[:2], 0)),
+            replace(self, explained=columns if freed else None),
+        )
         [whole] = states.judged(model, [columns], none)
         at, result = 0, []
         for one in model.acting:
