@@ -13,6 +13,7 @@ import syncline_design as sd
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.report.ci import notices
+from syncline_design.report.several import summary_line
 from syncline_design.verdict.baseline import against
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings
@@ -202,6 +203,27 @@ def test_check_takes_a_baseline_in_every_format(tmp_path: Path) -> None:
     _, said = run("check", spec, "--baseline", old, "-o", "github:-")
     assert "::error" not in said
     assert "title=ACC-1 accuracy (known)" in said
+
+
+def test_a_spec_that_stays_infeasible_has_no_further_test_case(tmp_path: Path) -> None:
+    """Every requirement that is in the way is there already, and known."""
+    verdict = verdict_of(tmp_path, OPEN)
+    then = [one.rule for one in notices(verdict)]
+    known = notices(against(verdict, [verdict], "old.json"))
+    assert [one.rule for one in known] == then
+    assert {one.justification for one in known if one.level == "known"} == {
+        "no worse than in old.json"
+    }
+
+
+def test_what_got_worse_says_what_it_was(tmp_path: Path) -> None:
+    before = verdict_of(tmp_path, changed(FAILING, (ACCURACY, "limit: 0.5 m")))
+    now = against(verdict_of(tmp_path, FAILING), [before], "old.json")
+    message = next(one.message for one in notices(now) if one.id == "ACC-1")
+    assert "; in old.json it was 0.4474\N{NO-BREAK SPACE}m of 0.5\N{NO-BREAK SPACE}m" in message
+    assert summary_line([now]).endswith(f"Against old.json 1 of 1 got worse: {now.name}.")
+    same = against(before, [before], "old.json")
+    assert summary_line([same]).endswith("Against old.json nothing got worse.")
 
 
 BROKEN = {

@@ -29,9 +29,12 @@ from syncline_design.report.checks import render_checks
 from syncline_design.report.notebook import shown as in_notebook
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_diff import on_diff
+from syncline_design.report.on_study import on_study
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
+from syncline_design.report.study_notices import study_notices
 from syncline_design.spec.load import BadInput, load, load_text
+from syncline_design.studies import StudySettings, run_study
 from syncline_design.verdict.baseline import against
 from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.pinned import picked_design
@@ -272,6 +275,8 @@ def test_an_expired_waiver_is_loud_and_helps_nothing(waived: tuple[Path, str]) -
     missed = [r.id for r in verdict.requirements if r.waiver and r.status == "fail"]
     assert waived[1] in missed
     plural = "waivers" if len(missed) > 1 else "waiver"
+    errors = [line for line in render_checks("github", [verdict]).splitlines() if "::error" in line]
+    assert [line.count("waiver expired on") for line in errors] == [1] * len(errors)
     for form in ("html", "markdown", "github"):
         shown = said(render_checks(form, [verdict]))
         assert f", {plural} of {' and '.join(missed)} expired" in shown
@@ -284,7 +289,17 @@ def test_a_waiver_that_is_not_needed_is_said_not_to_be(tmp_path: Path) -> None:
     told = [one for one in verdict.warnings if one.code == "waiver"]
     assert [one.requirement for one in told] == names
     assert all(one.message.endswith("it is met, so the waiver is not needed") for one in told)
-    assert "waived" not in console(on_verdict(verdict), colour=False).splitlines()[0]
+    shown = console(on_verdict(verdict), colour=False)
+    assert "waived" not in shown
+    assert "is not needed" in said(shown)
+    tests = ElementTree.fromstring(render_checks("junit", [verdict])).iter("testcase")
+    states = {
+        one.get("value")
+        for case in tests
+        for one in case.iter("property")
+        if one.get("name") == "status"
+    }
+    assert states == {"pass"}
 
 
 def test_reasons_leave_the_waived_aside(tmp_path: Path) -> None:
@@ -306,10 +321,43 @@ def test_against_a_baseline_without_the_waiver_nothing_is_worse(waived: tuple[Pa
     before = check_loaded(load(path), replace(QUIET, today=date(2999, 2, 1)))
     now = against(check_loaded(load(path), QUIET), [before], "old.json")
     assert (now.exit_code, now.verdict) == (0, "meets")
+    again = on_verdict(against(check_loaded(load(path), QUIET), [check_loaded(load(path), QUIET)],
+                               "old.json"))  # fmt: skip
+    told = said(console(again, colour=False)).partition("Against the baseline")[2]
+    assert "waived. Requirement" in told.replace("Meets every requirement, ", "")
+    assert " fail " not in told
     back = against(before, [check_loaded(load(path), QUIET)], "old.json")
     assert back.exit_code == 1
     assert back.baseline is not None
     assert [one.id for one in back.baseline.requirements if one.change == "worse"]
+
+
+TWO = """\
+study: 1
+name: Two waivers
+base: [spec.yaml, other.yaml]
+grid:
+  "stages[uav].distance": [40 m, 100 m]
+"""
+
+
+def test_a_study_tells_every_waiver_of_what_its_bases_miss(tmp_path: Path) -> None:
+    """One base's waiver is in force, the other's is over: neither hides the other."""
+    strict = SPEC.replace("limit: 100000 EUR", "limit: 100 EUR, waiver: {WAIVER}")
+    narrow = strict.replace(", ublox_f9p_pvt", "").replace(", sbg_ellipse", "")
+    narrow = narrow.replace(", riegl_vux1uav", "").replace("[hardware, gpio]", "[gpio]")
+    for name, reason, day in (
+        ("spec", "paper trial", "2027-03-31"),
+        ("other", "late", "2026-11-29"),
+    ):
+        text = narrow.replace("{WAIVER}", f"{{reason: {reason}, expires: {day}}}")
+        (tmp_path / f"{name}.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "study.yaml").write_text(TWO, encoding="utf-8")
+    result = run_study(tmp_path / "study.yaml", StudySettings(workers=1, today=DAY))
+    shown = said(console(on_study(result), colour=False))
+    assert "waived until 2027-03-31: paper trial; waiver expired on 2026-11-29: late" in shown
+    told = "".join(one.message for one in study_notices(result))
+    assert "waiver expired on 2026-11-29: late" in told
 
 
 def test_a_diff_names_what_is_waived(waived: tuple[Path, str]) -> None:

@@ -11,6 +11,7 @@ from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.verdict_words import kind_text, margin_text, outcome, waiver_text
 from syncline_design.verdict.obstacle import obstacle_sentence, remedies_sentence, requirement_name
+from syncline_design.verdict.since import Baseline
 from syncline_design.verdict.tree import (
     Caution,
     Checked,
@@ -18,6 +19,7 @@ from syncline_design.verdict.tree import (
     Refused,
     RequirementResult,
     Verdict,
+    waived_misses,
 )
 
 Level = Literal["pass", "fail", "undecided", "not_reached", "waived", "known", "warning"]
@@ -68,8 +70,8 @@ def _requirements(verdict: Verdict) -> Iterator[Notice]:
 
 
 def found_failure(found: list[Notice]) -> bool:
-    """Whether something already fails a job."""
-    return any(notice.level == "fail" for notice in found)
+    """Whether something fails a job already, or would but for a baseline."""
+    return any(notice.level in ("fail", "known") for notice in found)
 
 
 def _warning(entry: Caution, verdict: Verdict) -> Notice:
@@ -97,19 +99,39 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
     elif level == "undecided" and verdict.design is None:
         level = "not_reached"
     place = (row.line or 1, row.column or 1)
-    known, why = verdict.baseline, waiver_text(row)
+    known, why = verdict.baseline, waiver_text(row) if level == "waived" else ""
     if level == "fail" and row.waiver and row.waiver.expired:
-        message += f"; {why}"
-    if level in ("fail", "undecided") and known is not None and known.forgives(row.id):
-        level, why = "known", f"no worse than in {known.file}"
+        message += f"; {waiver_text(row)}"
+    if level in ("fail", "undecided") and known is not None:
+        if known.forgives(row.id):
+            level, why = "known", _no_worse(known)
+        else:
+            message += _then(known, row)
     return Notice(level, row.kind, row.id, verdict.file, *place, message, why, _figures(row))
+
+
+def _no_worse(known: Baseline) -> str:
+    return f"no worse than in {known.file}"
+
+
+def _then(known: Baseline, row: RequirementResult) -> str:
+    """What a requirement was at in the baseline, where both are known."""
+    was = next((one.was for one in known.requirements if one.id == row.id), None)
+    if was is None or was.value is None:
+        return ""
+    value, limit = numbers.held(was.value, was), numbers.limit(was)
+    return f"; in {known.file} it was {value} of {limit}"
 
 
 def _figures(row: RequirementResult) -> tuple[tuple[str, str], ...]:
     """What a requirement is held at, at full precision; what has no figure is left out."""
     known = (("limit", row.limit), ("value", row.value), ("margin", row.margin))
     shown = [(name, repr(value)) for name, value in known if numbers.finite(value) is not None]
-    return (*shown, ("unit", row.unit), ("status", "waived" if row.is_waived else row.status))
+    return (
+        *shown,
+        ("unit", row.unit),
+        ("status", "waived" if waived_misses([row]) else row.status),
+    )
 
 
 def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:
@@ -152,10 +174,11 @@ def requirement_sentence(row: RequirementResult) -> str:
 
 def _no_design(verdict: Verdict) -> Notice:
     level: Level = "fail" if verdict.verdict == "infeasible" else "undecided"
+    why = ""
     if verdict.baseline is not None and not verdict.baseline.worse:
-        level = "known"
+        level, why = "known", _no_worse(verdict.baseline)
     text = f"{outcome(verdict).word}. {obstacle_sentence(verdict.infeasibility)}{_fixes(verdict)}"
-    return Notice(level, verdict.verdict, "", verdict.file, 1, 1, text)
+    return Notice(level, verdict.verdict, "", verdict.file, 1, 1, text, why)
 
 
 def all_notices(verdicts: Iterable[Checked]) -> Iterator[Notice]:

@@ -9,7 +9,7 @@ from syncline_design.machine.sentences import sentence_list
 from syncline_design.report.text import visible
 from syncline_design.report.words import VERBS
 from syncline_design.spec.folders import Skipped
-from syncline_design.verdict.tree import Checked
+from syncline_design.verdict.tree import Checked, Verdict
 
 
 def summary_line(verdicts: Sequence[Checked]) -> str:
@@ -19,7 +19,19 @@ def summary_line(verdicts: Sequence[Checked]) -> str:
     counts: Counter[str] = Counter(verdict.verdict for verdict in verdicts)
     parts = [f"{counts[word]} {VERBS[word][counts[word] > 1]}" for word in VERBS if counts[word]]
     many = "spec" if len(verdicts) == 1 else "specs"
-    return f"{len(verdicts)} {many}: {sentence_list(parts)}."
+    return f"{len(verdicts)} {many}: {sentence_list(parts)}.{_since(verdicts)}"
+
+
+def _since(verdicts: Sequence[Checked]) -> str:
+    """` Against base.json 1 of 5 got worse: lake.`"""
+    known = [v.baseline for v in verdicts if isinstance(v, Verdict) and v.baseline is not None]
+    if not known:
+        return ""
+    worse = [v.name for v in verdicts if isinstance(v, Verdict) and v.baseline and v.baseline.worse]
+    lead = f" Against {visible(known[0].file)}"
+    if not worse:
+        return f"{lead} nothing got worse."
+    return f"{lead} {len(worse)} of {len(verdicts)} got worse: {visible(sentence_list(worse))}."
 
 
 def skipped_text(skipped: Sequence[Skipped]) -> str:

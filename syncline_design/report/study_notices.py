@@ -63,8 +63,8 @@ def _misses(case: CaseResult) -> Iterator[_Miss]:
     failing = case.record.failing
     missed = [r for r in case.record.requirements if r.id in failing and not r.is_waived]
     for row in missed:
-        sentence = requirement_sentence(row)
-        yield _Miss(row.kind, sentence, row.id, row.line, row.column)
+        over = f"; {waiver_text(row)}" if row.waiver else ""
+        yield _Miss(row.kind, requirement_sentence(row) + over, row.id, row.line, row.column)
     if missed:
         return
     problems = case.record.problems

@@ -259,13 +259,13 @@ def misses_table(summary: StudySummary) -> Table:
     several = [short_key(factor.key) for _, factor in varied(summary)]
     rows = []
     for one in misses(summary, shown_value):
-        row = summary.missed[one.requirement]
+        row, *others = summary.missed[one.requirement]
         rows.append([
             Cell(one.requirement), Cell(kind_text(row)),
             Cell(f"{numbers.count(one.cases)} of {numbers.count(len(summary.briefs))}",
                  float(one.cases)),
             Cell(numbers.count(one.waived) if one.waived else "", float(one.waived)),
-            Cell(waiver_text(row)),
+            Cell("; ".join(filter(None, map(waiver_text, (row, *others))))),
             *_where_cells(several, one.where),
         ])  # fmt: skip
     heads = ["Requirement", "Limits", "Fails in #", "Waived in #", "Waiver", *_at(several)]

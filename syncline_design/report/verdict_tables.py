@@ -62,7 +62,7 @@ def since(verdict: Verdict) -> Table | None:
     for one in baseline.requirements:
         row, was = now.get(one.id), one.was
         word = None if row is None else status_of(row)
-        then = None if was is None else status_word(was.status, waived=False)
+        then = None if was is None else status_word(was.status, waived=bool(was.waived))
         rows.append((
             Cell(one.id),
             Cell(SINCE[one.change].word, tone=SINCE[one.change].tone),

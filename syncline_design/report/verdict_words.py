@@ -138,10 +138,12 @@ def status_word(status: Status, *, waived: bool) -> Outcome:
 
 
 def waiver_text(row: RequirementResult) -> str:
-    """`waived until 2027-01-31: reason`, or why it no longer counts."""
+    """`waived until 2027-01-31: reason`, or why it does not count."""
     waiver = row.waiver
     if waiver is None:
         return ""
+    if row.status == "pass":
+        return f"its waiver (until {waiver.expires}: {waiver.reason}) is not needed"
     state = "waiver expired on" if waiver.expired else "waived until"
     return f"{state} {waiver.expires}: {waiver.reason}"
 
@@ -151,7 +153,9 @@ def since_sentence(baseline: Baseline, verdict: Verdict) -> str:
     file = visible(baseline.file)
     if baseline.verdict is None:
         return f"{file} holds no verdict on this spec: it is judged as it is."
-    was = f"Then ({file}): {OUTCOMES[baseline.verdict].word}."
+    waived = [one.id for one in baseline.requirements if one.was and one.was.waived]
+    then = with_waived(OUTCOMES[baseline.verdict], waived if baseline.verdict == "meets" else ())
+    was = f"Then ({file}): {then.word}."
     if verdict.verdict == "meets":
         return was
     if baseline.worse:

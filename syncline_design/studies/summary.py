@@ -57,14 +57,14 @@ class StudySummary:
     """Every case in a line, and the fronts that differ.
 
     accuracy: the first case's, in the unit of whose limit a page tells errors.  missed: by id, what
-    some case misses, as the first that does.
+    some case misses, as the first that does, and as the first with each other waiver.
     """
 
     result: Finished
     briefs: tuple[Brief, ...]
     fronts: tuple[StudyFront, ...]
     accuracy: RequirementResult | None = None
-    missed: Mapping[str, RequirementResult] = field(default_factory=dict)
+    missed: Mapping[str, Sequence[RequirementResult]] = field(default_factory=dict)
 
     @property
     def currencies(self) -> tuple[str, ...]:
@@ -136,12 +136,14 @@ def summarise(result: Finished) -> StudySummary:
     briefs: list[Brief] = []
     fronts: dict[tuple[tuple[CasePoint, ...], str], list[int]] = {}
     accuracy = None
-    missed: dict[str, RequirementResult] = {}
+    missed: dict[str, list[RequirementResult]] = {}
     for case in result.cases():
         briefs.append(_brief(case))
         for row in case.record.requirements:
             if row.id in briefs[-1].failing:
-                missed.setdefault(row.id, row)
+                alike = missed.setdefault(row.id, [])
+                if all(row.waiver != one.waiver for one in alike):
+                    alike.append(row)
         asked = (row for row in case.record.requirements if row.kind == "accuracy")
         accuracy = accuracy or next(asked, None)
         points = case.record.front

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Final
 
 from syncline_design.verdict.since import Baseline, Earlier, RequirementSince, SinceBaseline
-from syncline_design.verdict.tree import RequirementResult, Verdict
+from syncline_design.verdict.tree import RequirementResult, Verdict, waived_misses
 
 _OUTCOMES: Final = ("meets", "indeterminate", "fails", "infeasible")  # each worse than the last
 _STATUSES: Final = ("pass", "indeterminate", "fail")
@@ -63,7 +63,8 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
 
 
 def _earlier(row: RequirementResult) -> Earlier:
-    return Earlier(row.status, row.value, row.limit, row.unit, row.limit_written)
+    waived = bool(waived_misses([row])) or None
+    return Earlier(row.status, row.value, row.limit, row.unit, row.limit_written, waived)
 
 
 def _without_design(

@@ -12,13 +12,14 @@ SinceBaseline = Literal["worse", "better", "same", "new", "gone"]
 
 @dataclass(frozen=True, slots=True)
 class Earlier(Record):
-    """How a requirement stood in the baseline."""
+    """How a requirement stood in the baseline; waived: missed under a waiver then in force."""
 
     status: Literal["pass", "fail", "indeterminate"]
     value: float | None
     limit: float
     unit: str
     limit_written: str | None = optional()
+    waived: bool | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
