@@ -10,9 +10,12 @@ import pytest
 from typer.testing import CliRunner
 
 import syncline_design as sd
+from html_page import Page
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.report.ci import notices
+from syncline_design.report.on_verdicts import on_verdicts
+from syncline_design.report.render_html import html
 from syncline_design.report.several import summary_line
 from syncline_design.verdict.baseline import against
 from syncline_design.verdict.tree import Verdict
@@ -223,12 +226,25 @@ def test_what_got_worse_says_what_it_was(tmp_path: Path) -> None:
     assert "; in old.json it was 0.4474\N{NO-BREAK SPACE}m of 0.5\N{NO-BREAK SPACE}m" in message
     assert summary_line([now]).endswith(f"Against old.json 1 of 1 got worse: {now.name}.")
     same = against(before, [before], "old.json")
-    assert summary_line([same]).endswith("Against old.json nothing got worse.")
+    assert summary_line([same]).endswith("Against old.json nothing got worse: the exit code is 0.")
+
+
+def test_the_page_of_several_specs_says_what_became_of_each(tmp_path: Path) -> None:
+    before = verdict_of(tmp_path, changed(FAILING, (ACCURACY, "limit: 0.5 m")))
+    now = against(verdict_of(tmp_path, FAILING), [before], "old.json")
+    same = against(before, [before], "old.json")
+    text = Page(html(on_verdicts([now, same]))).text
+    assert "Against old.json 1 of 2 got worse" in text
+    table = text.partition("Since then")[2].partition("Specs")[0]
+    assert "worse" in table
+    assert "no worse" in table
+    assert "0.4474\N{NO-BREAK SPACE}m / 0.5\N{NO-BREAK SPACE}m" in text, "the figure then"
+    assert "Since then" not in Page(html(on_verdicts([before, before]))).text
 
 
 BROKEN = {
     "no file": (None, "no such file"),
-    "no JSON": ("{", "not JSON"),
+    "no JSON": ("{", "expected a verdict as `check --output json:PATH` writes it"),
     "another schema": ('{"schema": "syncline-design/diff/v1"}', "baseline"),
     "half a verdict": ('{"schema": "syncline-design/verdict/v1", "verdict": "meets"}', "missing"),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from study_specs import write
 from syncline_design.comparison.acceptance import AssumptionResult
 from syncline_design.report.charts_plan import beside
 from syncline_design.report.document import Document, Outcome, Text, pins, section, show
+from syncline_design.report.numbers import typeset
 from syncline_design.report.on_acceptance import assumptions_table
 from syncline_design.report.render_html import html
 from syncline_design.report.studies import render_study
@@ -44,6 +46,23 @@ def test_no_line_ends_at_the_hyphen_of_a_name(name: str) -> None:
 )  # fmt: skip
 def test_a_minus_is_printed_for_what_was_typed(typed: str, printed: str) -> None:
     assert printed in Page(page(Text(typed))).text
+
+
+def test_an_interval_may_end_a_line_between_its_ends_and_nowhere_else() -> None:
+    gap = "\N{NO-BREAK SPACE}"
+    assert typeset("-87.3 ms to -86.4 ms") == f"\u221287.3{gap}ms{gap}to \u221286.4{gap}ms"
+
+
+@pytest.mark.parametrize(
+    ("key", "steps"),
+    [("uav.position.timestamping", ["uav", ".position", ".timestamping"]),
+     ("hidden_latency_repaired.csv", ["hidden_", "latency_", "repaired", ".csv"]),
+     ("uav.distance", ["uav.distance"]), ("0.0001234567890123", ["0.0001234567890123"])],
+)  # fmt: skip
+def test_a_long_key_goes_on_at_its_dots(key: str, steps: list[str]) -> None:
+    assert f"see {'<wbr>'.join(steps)}" in re.sub(
+        r"</?(span|bdi)[^>]*>", "", page(Text(f"see {key}"))
+    )
 
 
 def test_every_assumption_is_headed_by_its_sensor() -> None:

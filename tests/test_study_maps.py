@@ -204,7 +204,10 @@ def test_a_study_of_one_key_shows_every_case_over_it(tmp_path: Path, key: str) -
         having = [p for p, b in zip(panel, summary.briefs, strict=True) if b.error_m is not None]
         for without in missing:
             assert all(without.left < p.left if across else without.top > p.top for p in having)
-    assert 'id="along"' in html(on_study(result))
+    page = html(on_study(result))
+    assert 'id="along"' in page
+    values = page.partition('id="along"')[2].partition("</figure>")[0].partition("Values")[2]
+    assert values.count("<tr>") == 1 + len(summary.briefs), "once, though in two panels"
 
 
 def test_a_study_of_two_keys_has_no_such_figure(tmp_path: Path) -> None:

@@ -269,8 +269,12 @@
   function every(frame, table) {
     var figure = frame.matches(".inner") && frame.closest("figure");
     var data = figure && said.get(figure.querySelector(".drawing"));
-    if (!data || data.rows.length < table.rows.length) { return shown(table); }
-    return [data.labels.map(quoted)].concat(data.rows.map(function (row) {
+    if (!data) { return shown(table); }
+    var once = {};  // what stands in two panels is one value
+    data.rows.forEach(function (row) { var says = row.slice(4).join(" "); once[says] = once[says] || row; });
+    var rows = data.rows.filter(function (row) { return once[row.slice(4).join(" ")] === row; });
+    if (rows.length < table.rows.length) { return shown(table); }
+    return [data.labels.map(quoted)].concat(rows.map(function (row) {
       return data.labels.map(function (_, k) { return quoted(data.words[row[4 + k]]); });
     }));
   }

@@ -67,7 +67,8 @@ def _is(path: Path, text: str) -> tuple[str, str]:
     try:
         data = json.loads(text, parse_constant=_no_constant)
     except json.JSONDecodeError as error:
-        problem = Flaw(str(path), error.lineno, error.colno, "", f"not JSON: {error.msg}")
+        wanted = "a verdict as `check --output json:PATH` writes it"
+        problem = Flaw(str(path), error.lineno, error.colno, "", f"not JSON: {error.msg}", wanted)
         raise BadInput((problem,)) from None
     except (ValueError, RecursionError) as error:
         deep = isinstance(error, RecursionError)

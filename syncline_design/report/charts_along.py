@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 Says = Sequence[Sequence[tuple[str, str]]]  # of every case: labels and values
 SHAPES: Final = "osD^"
 EDGE: Final = 0.16  # of a panel, for cases without a design
+MOST_LABEL: Final = 22  # letters of an entry of the legend beside another
 MOST_WORD: Final = 22  # letters of a word beside its row
 _MARKS: Final = {  # marker, colour, word
     "fails": ("x", BAD, BRIEF["fails"].word),
-    "infeasible": ("x", BAD, BRIEF["infeasible"].word),
+    "infeasible": ("X", BAD, BRIEF["infeasible"].word),
     "indeterminate": ("2", WARN, BRIEF["indeterminate"].word),
     "refused": ("+", MUTED, COMBINED),
 }
@@ -46,6 +47,8 @@ class _Group:
     marker: str
     colour: str
     cases: list[int]
+    size: float = 6.0
+    open: bool = False
 
 
 def over_key(
@@ -78,7 +81,8 @@ def over_key(
         for axes in every if words else [every[-1]]:
             _key_axis(axes, data)
         handles, labels = every[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower left", ncols=2)
+        columns = 1 if max(map(len, labels)) > MOST_LABEL else 2
+        figure.legend(handles, labels, loc="outside lower left", ncols=columns)
 
     meeting = sum(point.verdict == "meets" for point in data.points)
     key = short_key(data.axis.key)
@@ -100,7 +104,8 @@ def _panel(axes: Axes, data: KeySweep, panel: _Panel, says: Says) -> None:
         places = [data.points[k].place for k in group.cases]
         told = [values[k] for k in group.cases]
         axes.plot(*((told, places) if across == "x" else (places, told)), group.marker,
-                  color=group.colour, markersize=6.0, label=group.label)  # fmt: skip
+                  color=group.colour, markersize=group.size, label=group.label,
+                  markerfacecolor="none" if group.open else group.colour)  # fmt: skip
     for point, value, words in zip(data.points, values, says, strict=True):
         tell(axes, *((value, point.place) if across == "x" else (point.place, value)), words)
     scales.grid(axes)
@@ -140,7 +145,8 @@ def _groups(data: KeySweep) -> list[_Group]:
         which = f": {shortened(data.kinds[kind], 26)}" if data.kinds else ""
         chosen = [k for k, p in enumerate(data.points) if p.verdict == "meets" and p.kind == kind]
         style = SHAPES[kind % len(SHAPES)], SERIES[kind % len(SERIES)]
-        found.append(_Group(f"meets{which} ({len(chosen)})", *style, chosen))
+        size = 5.0 + 3.0 * kind  # one around the other, where bases come to the same
+        found.append(_Group(f"meets{which} ({len(chosen)})", *style, chosen, size, kind > 0))
     for verdict, (marker, colour, word) in _MARKS.items():
         chosen = [k for k, point in enumerate(data.points) if point.verdict == verdict]
         if chosen:

@@ -247,7 +247,11 @@ def with_uncertainty(value: float, uncertainty: float | None, unit: str) -> str:
 
 
 def typeset(text: str) -> str:
-    """A figure and its unit as pages print them: micro sign, minus, no break before the unit."""
+    """A figure and its unit as pages print them: micro sign, minus, no break before the unit.
+
+    A line may end between the two ends of an interval, so that none is torn where it is narrow.
+    """
     for plain, printed in _TYPOGRAPHIC:
         text = text.replace(plain, printed)
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
+    gap = "\N{NO-BREAK SPACE}"
+    return text.replace(" ", gap).replace(f"{gap}to{gap}", f"{gap}to ")

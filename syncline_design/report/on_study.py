@@ -173,7 +173,7 @@ def _says(
 ) -> list[tuple[str, str]]:
     """A case in words: number, setting, answer, price, error, payload."""
     values = [(short_key(f.key), shown_value(f, brief.labels[i])) for i, f in several]
-    found = [("Case", str(brief.number)), *values, ("Verdict", brief.verdict)]
+    found = [("Case", str(brief.number)), *values, ("Verdict", _word(brief))]
     if brief.failing:
         found.append(("Fails", ", ".join(brief.failing)))
     if brief.cost is not None:
@@ -286,7 +286,7 @@ def _case_table(summary: StudySummary) -> Table:
     many = len(result.study.bases) > 1
     rows = []
     for brief in summary.briefs[:MOST_CASES]:
-        shown = with_waived(replace(OUTCOMES[brief.verdict], word=brief.verdict), brief.waived)
+        shown = with_waived(replace(OUTCOMES[brief.verdict], word=_word(brief)), brief.waived)
         payload = ", ".join(pick.name for pick in brief.picks)
         why = payload or visible(reason(result.case(brief.number - 1)))
         named = [Cell(result.study.bases[brief.base].name)] if many else []
@@ -306,6 +306,11 @@ def _case_table(summary: StudySummary) -> Table:
     more = len(summary.briefs) - MOST_CASES
     note = f"{more} further cases are in the CSV and Parquet tables." if more > 0 else ""
     return table("All cases", heads, rows, note)
+
+
+def _word(brief: Brief) -> str:
+    """How a case ended, in the words of legend and headline."""
+    return "no verdict" if brief.verdict == "indeterminate" else brief.verdict
 
 
 def _missed(summary: StudySummary) -> list[Node]:

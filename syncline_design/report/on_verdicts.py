@@ -19,9 +19,10 @@ from syncline_design.report.document import (
     strong,
 )
 from syncline_design.report.on_verdict import on_verdict, problems
+from syncline_design.report.several import since_line
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_charts import tightest_limit
-from syncline_design.report.words import OUTCOMES, STATUSES
+from syncline_design.report.words import OUTCOMES, SINCE, STATUSES
 from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 
@@ -36,12 +37,13 @@ def on_verdicts(verdicts: Sequence[Checked]) -> Document:
     if waived:
         known = STATUSES["waived"] if known is OUTCOMES["meets"] else known
         word += f", {waived} with waived ones missed"
+    since = tuple(filter(None, [since_line(verdicts)]))
     specs = [node for n, verdict in enumerate(verdicts, 1) for node in _spec(verdict, n)]
     return Document(
         family="Overview",
         outcome=Outcome(known.tone, known.mark, word),
         name="Design verdicts",
-        sentences=(),
+        sentences=since,
         facts=(),
         sections=(
             *section("overview", "Overview", show(_overview(verdicts), silent=True)),
@@ -66,7 +68,20 @@ def _spec(verdict: Checked, index: int) -> list[Node]:
              mark=outcome.mark, tone=outcome.tone),
         Text(verdict_words.design_sentence(verdict)),
         *(problems(verdict) if isinstance(verdict, Refused) else _requirements(verdict, index)),
+        *_since(verdict, index),
     ]  # fmt: skip
+
+
+def _since(verdict: Checked, index: int) -> list[Node]:
+    """What became of the spec since a baseline."""
+    if isinstance(verdict, Refused) or verdict.baseline is None:
+        return []
+    found = verdict_tables.since(verdict)
+    caption = f"Spec {index}, {verdict.name}, against the baseline"
+    return [
+        Text(verdict_words.since_sentence(verdict.baseline, verdict)),
+        *(show(replace(found, caption=caption), silent=True) if found is not None else ()),
+    ]
 
 
 def _requirements(verdict: Verdict, index: int) -> list[Node]:
@@ -76,13 +91,25 @@ def _requirements(verdict: Verdict, index: int) -> list[Node]:
 
 
 def _overview(verdicts: Sequence[Checked]) -> Table:
-    rows = []
+    rows: list[tuple[Cell | str, ...]] = []
+    known = bool(since_line(verdicts))
     for verdict in verdicts:
         result = verdict_words.outcome(verdict)
         word = Cell(result.word, tone=result.tone, mark=result.mark)
-        rows.append((verdict.name, word, *_answer(verdict)))
-    heads = ("Spec", "Verdict", "Price #", "Syncline error #", "Tightest margin")
+        rows.append((verdict.name, word, *_answer(verdict), *_change(verdict, known)))
+    heads = ("Spec", "Verdict", "Price #", "Syncline error #", "Tightest margin",
+             *(("Since then",) if known else ()))  # fmt: skip
     return table("Verdicts", heads, rows)
+
+
+def _change(verdict: Checked, known: bool) -> tuple[Cell, ...]:
+    """Whether a spec got worse, beside others that are held against a baseline."""
+    if not known:
+        return ()
+    if isinstance(verdict, Refused) or verdict.baseline is None:
+        return (Cell(numbers.MISSING),)
+    word = SINCE["worse" if verdict.baseline.worse else "same"]
+    return (Cell(word.word, tone=word.tone),)
 
 
 def _answer(verdict: Checked) -> tuple[Cell, Cell, str]:

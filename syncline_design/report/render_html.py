@@ -39,7 +39,7 @@ _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _BRANCH: Final = r"[A-Za-z_]\w*(?:\[[^\]\s]*\])?"
 _PATH: Final = re.compile(rf"((?<![\w./]){_BRANCH}(?:\.{_BRANCH})+)")  # a key of a spec
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
-_DOT: Final = re.compile(r"(?<=[\w\]])(?=\.)")
+_DOT: Final = re.compile(r"(?<=[\w\]])(?=\.)|(?<=_)(?=[a-z])")
 
 
 def html(document: Document) -> str:
@@ -152,7 +152,7 @@ def _named(text: str) -> Any:
 
 
 def _breakable(key: str) -> Any:
-    """A long key path: where no line holds it, it goes on in the next before one of its dots."""
+    """A long key path or file's name: where no line holds it, it goes on at a dot or low line."""
     from markupsafe import Markup
 
     if len(key) <= _SHORT_KEY:
@@ -180,9 +180,10 @@ def _values(figure: InlineChart, caption: str) -> Table | None:
     """The same as a table, as far as anyone reads; None of a figure that says nothing."""
     if not figure.told:
         return None
-    end, every = MOST_VALUES // 2, numbers.count(len(figure.told))
-    whole = len(figure.told) <= MOST_VALUES
-    told = figure.told if whole else (*figure.told[:end], *figure.told[-end:])
+    once = list({tuple(one.says.items()): one for one in figure.told}.values())  # of two panels
+    end, every = MOST_VALUES // 2, numbers.count(len(once))
+    whole = len(once) <= MOST_VALUES
+    told = once if whole else [*once[:end], *once[-end:]]
     labels = sorted(_labels(figure), key=lambda one: any(one not in t.says for t in figure.told))
     columns = [worded(padded([t.says.get(label, "") for t in told])) for label in labels]
     note = f"The first and the last {end} of {every}; the figure tells them all, one by one."

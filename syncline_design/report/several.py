@@ -19,18 +19,18 @@ def summary_line(verdicts: Sequence[Checked]) -> str:
     counts: Counter[str] = Counter(verdict.verdict for verdict in verdicts)
     parts = [f"{counts[word]} {VERBS[word][counts[word] > 1]}" for word in VERBS if counts[word]]
     many = "spec" if len(verdicts) == 1 else "specs"
-    return f"{len(verdicts)} {many}: {sentence_list(parts)}.{_since(verdicts)}"
+    return f"{len(verdicts)} {many}: {sentence_list(parts)}. {since_line(verdicts)}".strip()
 
 
-def _since(verdicts: Sequence[Checked]) -> str:
-    """` Against base.json 1 of 5 got worse: lake.`"""
+def since_line(verdicts: Sequence[Checked]) -> str:
+    """`Against base.json 1 of 5 got worse: lake.`; nothing without a baseline."""
     known = [v.baseline for v in verdicts if isinstance(v, Verdict) and v.baseline is not None]
     if not known:
         return ""
     worse = [v.name for v in verdicts if isinstance(v, Verdict) and v.baseline and v.baseline.worse]
-    lead = f" Against {visible(known[0].file)}"
+    lead = f"Against {visible(known[0].file)}"
     if not worse:
-        return f"{lead} nothing got worse."
+        return f"{lead} nothing got worse: the exit code is 0."
     return f"{lead} {len(worse)} of {len(verdicts)} got worse: {visible(sentence_list(worse))}."
 
 

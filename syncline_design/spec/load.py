@@ -26,6 +26,7 @@ from syncline_design.spec.files import (
     inside_folder,
     problem_at,
 )
+from syncline_design.spec.kinds import misplaced
 from syncline_design.spec.known_effects import effect_problems
 from syncline_design.spec.missions import disagreements, in_mission, mission_documents
 from syncline_design.spec.references import (
@@ -131,6 +132,8 @@ def _loaded(
 ) -> Case:
     if document.data is None:
         raise BadInput(document.problems)
+    if (other := misplaced(document, "spec")) is not None:
+        raise BadInput((other,))
     return _complete(document, path, catalogs_of(document, path, builtin), found)
 
 

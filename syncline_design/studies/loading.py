@@ -17,6 +17,7 @@ from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import MOST_PATH, Collection, fill_empirical, problem_at
 from syncline_design.spec.keys import CATALOG, KeyPathError, label, plain, put, resolve, value_at
+from syncline_design.spec.kinds import misplaced
 from syncline_design.spec.load import BadInput, catalogs_of, load_document
 from syncline_design.spec.references import unknown_ids
 from syncline_design.spec.spec import Spec
@@ -104,6 +105,8 @@ def _depth(setting: tuple[KeyPath, Any]) -> int:
 def load_study(path: str | Path) -> Study:
     """Read a study with its base specs; BadInput names everything wrong with them in one go."""
     document = read(path)
+    if (other := misplaced(document, "study")) is not None:
+        raise BadInput((other,))
     study_file, problems = validate(StudyFile, document)
     problems = [*document.problems, *problems]
     if study_file is None:
