@@ -160,14 +160,17 @@ def test_values_of_very_many_points_are_both_ends_of_them_and_say_so() -> None:
         assert (f"design {design}<" in plain) is there
 
 
-def test_a_second_output_without_its_option_is_told_so(tmp_path: Path) -> None:
+def test_a_second_output_needs_no_option_of_its_own_but_must_follow_one(tmp_path: Path) -> None:
     spec = tmp_path / "spec.yaml"
     spec.write_text(SPEC, encoding="utf-8")
-    words = ["check", str(spec), "-o", f"json:{tmp_path / 'a.json'}", f"html:{tmp_path / 'b.html'}"]
-    found = CliRunner().invoke(app, words)
-    assert found.exit_code == 2
-    assert f"an output takes its own option: --output html:{tmp_path}" in found.output
+    first, second = f"json:{tmp_path / 'a.json'}", f"html:{tmp_path / 'b.html'}"
+    apart = CliRunner().invoke(app, ["check", "-o", first, str(spec), second])
+    assert apart.exit_code == 2
+    assert f"an output takes its own option: --output {second}" in apart.output
     assert sorted(p.name for p in tmp_path.iterdir()) == ["spec.yaml"]
+    beside = CliRunner().invoke(app, ["check", str(spec), "-q", "-o", first, second])
+    assert beside.exit_code == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "b.html", "spec.yaml"]
 
 
 def test_a_spec_that_is_called_like_an_output_is_read(

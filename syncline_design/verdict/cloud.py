@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
-from syncline_design.choice.evaluate import broken, chosen_clocks, chosen_options, evaluate
+from syncline_design.choice.evaluate import broken, chosen_options, evaluate
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import in_force
 from syncline_design.verdict.named import CloudDesign, FrontDesign
@@ -32,43 +31,21 @@ def cloud(
     them: nothing else could have kept it out.
     """
     found, named = [], names or [{} for _ in problem.roles]
-    several = _several_primitives(problem)
     for design in _designs(problem):
         in_force().check()
         sums = evaluate(problem, design)
         if sums.cost is not None:
-            payload = _payload(problem, design, named, several)
+            options = chosen_options(problem, design)
+            payload = ", ".join(
+                f"{called.get(one.sensor, one.sensor)} ({one.method})"
+                for called, one in zip(named, options, strict=True)
+            )
             breaks = broken(problem, sums, accuracy=False)
             one = CloudDesign(float(sums.cost), float(sums.total_m), payload, breaks)
             if not breaks and problem.judge is not None and front and not _beaten(one, front):
                 one = replace(one, breaks=(SIMULATED,))
             found.append(one)
     return tuple(sorted(found, key=lambda one: (one.cost, one.error_m, one.payload)))
-
-
-def _several_primitives(problem: Problem) -> list[set[tuple[str, str]]]:
-    """Of each role the sensors and methods that it offers with more than one primitive."""
-    found = []
-    for role in problem.roles:
-        count = Counter((one.sensor, one.method) for one in role.options)
-        found.append({pair for pair, times in count.items() if times > 1})
-    return found
-
-
-def _payload(
-    problem: Problem, design: Design, names: Sequence[Mapping[str, str]],
-    several: Sequence[set[tuple[str, str]]],
-) -> str:  # fmt: skip
-    """`u-blox F9P (gpio), SBG Apogee (gpio, PPS)`, with all that tells it from other designs."""
-    told = []
-    options = chosen_options(problem, design)
-    for called, one, alike in zip(names, options, several, strict=True):
-        primitive = f", {one.primitive}" if (one.sensor, one.method) in alike else ""
-        told.append(f"{called.get(one.sensor, one.sensor)} ({one.method}{primitive})")
-    for vehicle, clock in zip(problem.vehicles, chosen_clocks(problem, design), strict=True):
-        if len(vehicle.clocks) > 1:
-            told.append(f"clock {clock.id or 'none'}")
-    return ", ".join(told)
 
 
 def _beaten(one: CloudDesign, front: Sequence[FrontDesign]) -> bool:
