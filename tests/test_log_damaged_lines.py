@@ -247,3 +247,51 @@ def test_a_header_settles_how_many_fields_where_rows_disagree(tmp_path: Path) ->
     assert told(recording) == [1]
     recording = written(tmp_path / "run.pos", [row.encode() for row in (TITLE, solution(0), short)])
     assert told(recording) == [0]
+
+
+LAST = {
+    "decimals": lambda k: f"{1795000000 + 0.02 * k:.6f},{1795000000.5 + 0.02 * k:.6f}",
+    "exponents": lambda k: f"{0.02 * k + 1.5:.6e},{0.02 * k + 1.7:.9e}",
+    "whole": lambda k: f"{(1795000000 + k) * 10**9},{(1795000000 + k) * 10**9 + 524_618_137}",
+    "dates": lambda k: (
+        f"2026-11-30T12:{k // 60:02d}:{k % 60:02d}.125,2026-11-30T12:{k // 60:02d}:{k % 60:02d}.225"
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", LAST)
+@pytest.mark.parametrize("rows", [150, 900])
+def test_a_last_row_that_is_cut_within_its_last_figure_is_left_out(
+    tmp_path: Path, kind: str, rows: int
+) -> None:
+    """A row of fewer digits than all above it, which no line end closes; a whole one is read."""
+    unit = "" if kind == "dates" else "_ns" if kind == "whole" else "_s"
+    lines_ = [f"stamp{unit},receive{unit}", *(LAST[kind](k) for k in range(rows))]
+    text = "\n".join(lines_)
+    digits = len(lines_[-1].split(",")[1])
+    for cut in range(digits + 1):
+        path = tmp_path / "x.csv"
+        path.write_text(text[: len(text) - cut], "utf-8")
+        recording = open_recording(path)
+        stamps = recording.streams()[0].stamps
+        assert stamps is not None
+        assert stamps.primary_ns.size == rows - (cut > 0), cut
+        assert (recording.incomplete is not None) == (cut > 0), cut
+        assert cut == 0 or "the last row is cut" in str(recording.incomplete)
+
+
+def test_a_last_row_of_fewer_digits_is_whole_where_figures_vary(tmp_path: Path) -> None:
+    """Figures as Python writes them end in any digit, and counts fall to fewer."""
+    rng = np.random.default_rng(3)
+    for figures in (
+        [*(round(float(v), 3) for v in rng.uniform(0.0, 9.0, 2000)), 4.5],
+        [*rng.integers(10, 14, 2000).tolist(), 9],
+        [*rng.integers(100000, 999999, 2000).tolist(), 3],
+        [*range(10, 90), 9],
+    ):
+        path = tmp_path / "x.csv"
+        rows = [f"{k}.25,{one}" for k, one in enumerate(figures)]
+        path.write_text("\n".join(["time_s,range_m", *rows]), "utf-8")
+        recording = open_recording(path)
+        assert len(recording.streams()[0].stamps.primary_ns) == len(figures)  # type: ignore[union-attr]
+        assert recording.incomplete is None

@@ -11,7 +11,6 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.logs import delimited
 from syncline_design.logs.cells import (
-    NOTHING,
     ONE_MARK,
     ONE_ZONE,
     BadCellError,
@@ -24,6 +23,7 @@ from syncline_design.logs.cells import (
 )
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_source import MOST_ROWS, Clock, Mask, finite
+from syncline_design.logs.torn_rows import is_cut
 from syncline_design.spec.load import BadInput
 
 if TYPE_CHECKING:
@@ -51,8 +51,7 @@ class TextSource:
         at, text = found
         if not text.strip() or text.lstrip().startswith("#"):
             return
-        cells = delimited.split_line(text, self.how.separator)
-        if len(cells) < len(self.header) or cells[-1].strip() in NOTHING or _torn(cells[-1]):
+        if is_cut(self.path, self.how, at, text):
             self.end, self.cut = at, -1
 
     def clock(self, name: str) -> Clock:
@@ -178,18 +177,3 @@ def text_among_numbers(
         found=repr(bad.text[:40]),
         hint=bad.hint,
     )
-
-
-def _torn(cell: str) -> bool:
-    """Whether the last cell stops within a number: `-`, `1e`, `1.5e-`."""
-    text = cell.strip().replace(",", ".")
-    try:
-        float(text)
-    except ValueError:
-        if text[-1:] in "+-eE.":
-            try:
-                float(text + "0")
-            except ValueError:
-                return False
-            return True
-    return False

@@ -1,0 +1,84 @@
+"""Whether the last row of a file, which no line end closes, was cut off within its last cell.
+
+What is left of a figure is one as well, of fewer digits: the rows above tell how many are due.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+from syncline_design.logs.cells import ISO, NOTHING
+from syncline_design.logs.delimited import Dialect, split_line
+
+_TAIL_BYTES: Final = 1 << 16
+_LEAST: Final = 100  # rows above, of which a whole figure hardly has the fewest digits by chance
+_FIGURE: Final = re.compile(r"[+-]?(\d+)(?:[.,](\d*))?")
+_POWER: Final = re.compile(r"[+-]?\d+(?:[.,]\d*)?[eE][+-]?\d+")
+_DATE: Final = re.compile(ISO)
+
+
+def is_cut(path: Path, how: Dialect, at: int, last: str) -> bool:
+    """Whether a last line lacks cells or the end of its last one; at: where it begins."""
+    cells = split_line(last, how.separator)
+    if len(cells) < len(how.names) or cells[-1].strip() in NOTHING or _stops(cells[-1]):
+        return True
+    return _lacks_digits(cells[-1].strip(), _last_cells(path, how, at))
+
+
+def _last_cells(path: Path, how: Dialect, end: int) -> list[str]:
+    """Of the rows before `end`, those of the last part of a file."""
+    begin = max(how.body, end - _TAIL_BYTES)
+    with path.open("rb") as file:
+        file.seek(begin)
+        lines = file.read(end - begin).decode("utf-8", errors="replace").splitlines()
+    whole = lines if begin == how.body else lines[1:]
+    rows = [split_line(line, how.separator) for line in whole if line.strip()[:1] not in ("", "#")]
+    cells = [row[-1].strip() for row in rows if len(row) == len(how.names)]
+    return [cell for cell in cells if cell not in NOTHING]
+
+
+def _lacks_digits(cell: str, above: Sequence[str]) -> bool:
+    """Whether a cell is shorter than every one of many above it, as none of its kind is."""
+    if len(above) < _LEAST:
+        return False
+    for kind in (_DATE, _POWER):
+        if all(kind.fullmatch(other) for other in above):  # of one length, where all are written so
+            return len({len(other) for other in above}) == 1 and len(cell) < len(above[0])
+    found, others = _FIGURE.fullmatch(cell), [_FIGURE.fullmatch(other) for other in above]
+    if found is None or not all(others):
+        return False
+    decimals = min(len(one[2] or "") for one in others if one)
+    if decimals:
+        return len(found[2] or "") < decimals
+    whole = [int(one[1]) for one in others if one and one[2] is None]
+    return len(whole) == len(above) and found[2] is None and _fell_short(int(found[1]), whole)
+
+
+def _fell_short(figure: int, above: Sequence[int]) -> bool:
+    """Whether a whole number is far from the one above, and with the digits that it has fewer is
+    as near to it as these are to one another."""
+    missing = min(len(str(one)) for one in above) - len(str(figure))
+    step = max(abs(b - a) for a, b in pairwise(above))
+    if missing < 1 or abs(figure - above[-1]) <= step:
+        return False
+    first, last = (int(f"{figure}{digit * missing}") for digit in "09")
+    return first <= above[-1] + step and last >= above[-1] - step
+
+
+def _stops(cell: str) -> bool:
+    """Whether a cell stops within a number: `-`, `1e`, `1.5e-`."""
+    text = cell.strip().replace(",", ".")
+    try:
+        float(text)
+    except ValueError:
+        if text[-1:] in "+-eE.":
+            try:
+                float(text + "0")
+            except ValueError:
+                return False
+            return True
+    return False
