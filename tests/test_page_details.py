@@ -57,6 +57,7 @@ def test_an_interval_may_end_a_line_between_its_ends_and_nowhere_else() -> None:
     ("key", "steps"),
     [("uav.position.timestamping", ["uav", ".position", ".timestamping"]),
      ("hidden_latency_repaired.csv", ["hidden_", "latency_", "repaired", ".csv"]),
+     ("(hidden_latency_repaired.csv).", ["(hidden_", "latency_", "repaired", ".csv)."]),
      ("uav.distance", ["uav.distance"]), ("0.0001234567890123", ["0.0001234567890123"])],
 )  # fmt: skip
 def test_a_long_key_goes_on_at_its_dots(key: str, steps: list[str]) -> None:

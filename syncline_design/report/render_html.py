@@ -37,9 +37,11 @@ _NAME: Final = re.compile(  # an id, a type, a power of ten, `u-blox`
 )
 _MINUS: Final = re.compile(r"(?<![\w.,:/-])-(?=\d)|(?<=\de)-(?=\d)")
 _BRANCH: Final = r"[A-Za-z_]\w*(?:\[[^\]\s]*\])?"
-_PATH: Final = re.compile(rf"((?<![\w./]){_BRANCH}(?:\.{_BRANCH})+)")  # a key of a spec
+_PATH: Final = re.compile(  # a key of a spec or a file's name, with the marks that stand at it
+    rf"((?<![\w./])\(?{_BRANCH}(?:\.{_BRANCH})+[).,;:]*)"
+)
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
-_DOT: Final = re.compile(r"(?<=[\w\]])(?=\.)|(?<=_)(?=[a-z])")
+_DOT: Final = re.compile(r"(?<=[\w\]])(?=\.\w)|(?<=_)(?=[a-z])")
 
 
 def html(document: Document) -> str:
