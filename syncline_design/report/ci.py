@@ -50,7 +50,7 @@ def notices(verdict: Checked) -> list[Notice]:
     if isinstance(verdict, Refused):
         return [_problem(entry) for entry in verdict.problems]
     found = list(_requirements(verdict))
-    if verdict.verdict in ("infeasible", "indeterminate") and not found_failure(found):
+    if verdict.verdict in ("infeasible", "indeterminate") and not _is_told(found, verdict):
         found.insert(0, _no_design(verdict))
     return found + [_warning(entry, verdict) for entry in verdict.warnings]
 
@@ -69,9 +69,11 @@ def _requirements(verdict: Verdict) -> Iterator[Notice]:
             yield replace(found, id=f"{mission.name} {row.id}", message=message)
 
 
-def found_failure(found: list[Notice]) -> bool:
-    """Whether something fails a job already, or would but for a baseline."""
-    return any(notice.level in ("fail", "known") for notice in found)
+def _is_told(found: list[Notice], verdict: Verdict) -> bool:
+    """Whether something fails a job already, or would but for the baseline."""
+    forgiven = verdict.baseline is not None and not verdict.baseline.worse
+    telling = ("fail", "known") if forgiven else ("fail",)
+    return any(notice.level in telling for notice in found)
 
 
 def _warning(entry: Caution, verdict: Verdict) -> Notice:
