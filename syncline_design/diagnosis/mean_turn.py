@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from syncline_design.diagnosis.position_arms import holds_arms, with_arms_told
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
@@ -25,14 +26,7 @@ BROKEN, ALONG = "mounting", "xyz"  # the assumption that such a turn breaks
 
 def with_mean_turn(named: Sequence[Finding], view: Scene) -> tuple[Finding, ...]:
     """The findings, an arm of a position log with the turn of the attitudes that it may be."""
-    if view.log.kind != "position" or len(view.system.stages) != 1:
-        return tuple(named)
-    arm_m = np.broadcast_to(view.rows[0].antenna_m, (len(view), 3))[0]
-    return tuple(_with_turn(one, arm_m) if _is_arm(one) else one for one in named)
-
-
-def _is_arm(one: Finding) -> bool:
-    return registry()[one.effect].breaks == "lever_arm" and one.sensor == "position"
+    return with_arms_told(named, view, _with_turn) if holds_arms(view) else tuple(named)
 
 
 def _with_turn(one: Finding, arm_m: Array) -> Finding:

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from syncline_design.diagnosis.borne_out import FALLS_TO, WITHIN_RAD, heading_off
+from syncline_design.diagnosis.position_arms import holds_arms, with_arms_told
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.scene import Scene
-from syncline_design.effects import registry
 from syncline_design.effects.kinematics import euler_to_rotation
 from syncline_design.effects.record import Array
 from syncline_design.model.figure_text import to_places
@@ -24,17 +24,12 @@ QUARTERS_DEG = (90.0, 180.0, -90.0)
 
 def with_turned_heading(named: Sequence[Finding], view: Scene) -> tuple[Finding, ...]:
     """The findings, an arm of a position log with the turn of the heading that it may be."""
-    if view.log.kind != "position" or len(view.system.stages) != 1:
+    if not holds_arms(view):
         return tuple(named)
     off = heading_off(view)
     if off is not None and abs(off) < WITHIN_RAD:
         return tuple(named)
-    arm_m = np.broadcast_to(view.rows[0].antenna_m, (len(view), 3))[0]
-    return tuple(_with_turn(one, arm_m) if _is_arm(one) else one for one in named)
-
-
-def _is_arm(one: Finding) -> bool:
-    return registry()[one.effect].breaks == "lever_arm" and one.sensor == "position"
+    return with_arms_told(named, view, _with_turn)
 
 
 def _with_turn(one: Finding, arm_m: Array) -> Finding:
