@@ -219,6 +219,21 @@ def test_a_spec_that_stays_infeasible_has_no_further_test_case(tmp_path: Path) -
     }
 
 
+def test_an_implied_limit_is_neither_gone_nor_new_where_no_design_is(tmp_path: Path) -> None:
+    """It has no row without a design, though the spec asks for it as before."""
+    asked = changed(OPEN, ("  - {id: SYNC-1, kind: sync, limit: 1.0}\n", ""))
+    infeasible = verdict_of(tmp_path, asked)
+    meets = verdict_of(tmp_path, changed(asked, ("limit: 5 cm", "limit: 9 m")))
+    assert [row.id for row in meets.requirements if row.line is None]
+    fell = against(infeasible, [meets], "old.json").baseline
+    assert fell is not None
+    assert "gone" not in {one.change for one in fell.requirements}
+    rose = against(meets, [infeasible], "old.json").baseline
+    assert rose is not None
+    assert not rose.worse
+    assert "new" not in {one.change for one in rose.requirements}
+
+
 def test_what_got_worse_says_what_it_was(tmp_path: Path) -> None:
     before = verdict_of(tmp_path, changed(FAILING, (ACCURACY, "limit: 0.5 m")))
     now = against(verdict_of(tmp_path, FAILING), [before], "old.json")

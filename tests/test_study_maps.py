@@ -210,6 +210,15 @@ def test_a_study_of_one_key_shows_every_case_over_it(tmp_path: Path, key: str) -
     assert values.count("<tr>") == 1 + len(summary.briefs), "once, though in two panels"
 
 
+def test_a_terminal_tells_why_cases_cannot_be_as_combined(tmp_path: Path) -> None:
+    key = '"stages[uav].position.timestamping": [gpio, ntp]'
+    document = on_study(done(tmp_path, ONE.format(key=key)))
+    shown = " ".join(console(document, colour=False).split())
+    assert "ntp cannot stamp ublox_f9p_rtk" in shown
+    assert "(1 of 2)" in shown
+    assert "Which cases cannot be as combined" not in html(document), "it has its table of cases"
+
+
 def test_a_study_of_two_keys_has_no_such_figure(tmp_path: Path) -> None:
     result = done(tmp_path, GRID.format(across=2, up=2))
     assert along(summarise(result)) is None

@@ -332,6 +332,20 @@ def test_against_a_baseline_without_the_waiver_nothing_is_worse(waived: tuple[Pa
     assert [one.id for one in back.baseline.requirements if one.change == "worse"]
 
 
+def test_what_a_waiver_covers_may_be_missed_by_more(waived: tuple[Path, str]) -> None:
+    """It is told, and does not count."""
+    verdict = check_loaded(load(waived[0]), QUIET)
+    tighter = tuple(
+        replace(row, limit=0.9 * row.limit, limit_written=None) if row.id == waived[1] else row
+        for row in verdict.requirements
+    )
+    now = against(replace(verdict, requirements=tighter), [verdict], "old.json")
+    assert (now.exit_code, now.baseline and now.baseline.worse) == (0, False)
+    told = said(console(on_verdict(now), colour=False)).partition("Against the baseline")[2]
+    assert f"{waived[1]} worse, waived" in told
+    assert "in old.json it was" in render_checks("github", [now])
+
+
 TWO = """\
 study: 1
 name: Two waivers

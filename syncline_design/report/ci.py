@@ -104,11 +104,10 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
     known, why = verdict.baseline, waiver_text(row) if level == "waived" else ""
     if level == "fail" and row.waiver and row.waiver.expired:
         message += f"; {waiver_text(row)}"
-    if level in ("fail", "undecided") and known is not None:
-        if known.forgives(row.id):
-            level, why = "known", _no_worse(known)
-        else:
-            message += _then(known, row)
+    if known is not None and level in ("fail", "undecided") and known.forgives(row.id):
+        level, why = "known", _no_worse(known)
+    elif known is not None and level != "pass" and not known.forgives(row.id):
+        message += _then(known, row)
     return Notice(level, row.kind, row.id, verdict.file, *place, message, why, _figures(row))
 
 

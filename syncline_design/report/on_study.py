@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from functools import partial
 
@@ -12,6 +13,7 @@ from syncline_design.report.document import (
     Chart,
     Document,
     Group,
+    Items,
     Node,
     Text,
     given,
@@ -85,6 +87,8 @@ def on_study(result: StudyResult) -> Document:
                      winners, "What wins where"),
             *section("misses", "Which requirements fail",
                      _missed(summary), "What fails"),
+            *section("refused", "Which cases cannot be as combined", _refused(summary),
+                     reach="text"),
             *section("ends", "Where feasibility ends", _ends(summary), "Where it ends"),
             *section("fronts", "Cost against error, front by case", _fronts(summary), "Fronts"),
             *section("cases", "Cases", cases),
@@ -311,6 +315,17 @@ def _case_table(summary: StudySummary) -> Table:
 def _word(brief: Brief) -> str:
     """How a case ended, in the words of legend and headline."""
     return "no verdict" if brief.verdict == "indeterminate" else brief.verdict
+
+
+def _refused(summary: StudySummary) -> list[Node]:
+    """Why cases cannot be as combined, each reason once; a page has it in its table of cases."""
+    cases = (summary.result.case(b.number - 1) for b in summary.briefs if b.verdict == "refused")
+    count = Counter(visible(reason(case)) for case in cases)
+    told = [f"{why} ({numbers.count(n)} of {numbers.count(len(summary.briefs))})"
+            for why, n in count.most_common(MOST_DOWN)]  # fmt: skip
+    left = len(count) - len(told)
+    more = [f"and {numbers.count(left)} further reasons: see the page or the CSV"] if left else []
+    return [Items((*told, *more))] if told else []
 
 
 def _missed(summary: StudySummary) -> list[Node]:

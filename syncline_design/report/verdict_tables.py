@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
@@ -20,7 +21,14 @@ from syncline_design.report.verdict_words import (
     term_text,
     waiver_text,
 )
-from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SINCE, SYNC_MODELS, TIMELINES
+from syncline_design.report.words import (
+    LEDGER_KINDS,
+    PRIMITIVES,
+    SINCE,
+    STATUSES,
+    SYNC_MODELS,
+    TIMELINES,
+)
 from syncline_design.verdict.bill import total
 from syncline_design.verdict.measured import claim_words
 
@@ -63,9 +71,12 @@ def since(verdict: Verdict) -> Table | None:
         row, was = now.get(one.id), one.was
         word = None if row is None else status_of(row)
         then = None if was is None else status_word(was.status, waived=bool(was.waived))
+        since = SINCE[one.change]
+        if one.change == "worse" and word is STATUSES["waived"]:
+            since = replace(since, tone=word.tone, word=f"{since.word}, {word.word}")
         rows.append((
             Cell(one.id),
-            Cell(SINCE[one.change].word, tone=SINCE[one.change].tone),
+            Cell(since.word, tone=since.tone),
             "-" if word is None else word.word,
             _both(row),
             "-" if then is None else then.word,

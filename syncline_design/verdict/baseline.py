@@ -51,15 +51,23 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
     old = {row.id: row for row in before.requirements}
     for row in verdict.requirements:
         was = old.pop(row.id, None)
-        if was is None:
-            change: SinceBaseline = "new"
+        if was is None and _is_implied(row) and before.design is None:
+            change: SinceBaseline = _without_design(verdict, before, row, row)
+        elif was is None:
+            change = "new"
         elif None in (verdict.design, before.design):
             change = _without_design(verdict, before, row, was)
         else:
             change = _since(row, was)
         yield RequirementSince(row.id, change, None if was is None else _earlier(was))
     for was in old.values():
-        yield RequirementSince(was.id, "gone", _earlier(was))
+        if verdict.design is not None or not _is_implied(was):
+            yield RequirementSince(was.id, "gone", _earlier(was))
+
+
+def _is_implied(row: RequirementResult) -> bool:
+    """A limit that no spec writes: only a design is held against it, so it is never new or gone."""
+    return row.line is None
 
 
 def _earlier(row: RequirementResult) -> Earlier:
