@@ -210,6 +210,19 @@ def test_a_study_of_one_key_shows_every_case_over_it(tmp_path: Path, key: str) -
     assert values.count("<tr>") == 1 + len(summary.briefs), "once, though in two panels"
 
 
+def test_a_waived_miss_is_half_filled_and_said(tmp_path: Path) -> None:
+    """It meets by a waiver alone: mark, legend and words tell it from what keeps every limit."""
+    asked = "limit: 100000 EUR"
+    spec = NARROW.replace(asked, "limit: 100 EUR, waiver: {reason: paper, expires: 2999-01-31}")
+    assert spec != NARROW
+    result = done(tmp_path, ONE.format(key='"stages[uav].distance": [30 m, 31 m]'), spec)
+    assert [point.waived for point in getattr(along(summarise(result)), "points", ())] == [True] * 2
+    page = html(on_study(result)).partition('id="along"')[2].partition("</section>")[0]
+    assert "meets, waived (2)" in page
+    assert "meets, COST-1 waived" in page, "the words of the figure"
+    assert "Fails" not in page
+
+
 def test_a_terminal_tells_why_cases_cannot_be_as_combined(tmp_path: Path) -> None:
     key = '"stages[uav].position.timestamping": [gpio, ntp]'
     document = on_study(done(tmp_path, ONE.format(key=key)))

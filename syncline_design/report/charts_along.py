@@ -9,7 +9,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
-from syncline_design.report.palette import BAD, MUTED, SERIES, WARN
+from syncline_design.report.palette import BAD, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.study_words import COMBINED, short_key
 from syncline_design.report.svg import InlineChart, draw, tell
 from syncline_design.report.text import shortened
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Fill = Literal["full", "left", "none"]  # of a mark
 Says = Sequence[Sequence[tuple[str, str]]]  # of every case: labels and values
 SHAPES: Final = "osD^"
 EDGE: Final = 0.16  # of a panel, for cases without a design
@@ -48,7 +49,7 @@ class _Group:
     colour: str
     cases: list[int]
     size: float = 6.0
-    open: bool = False
+    fill: Fill = "full"
 
 
 def over_key(
@@ -105,7 +106,7 @@ def _panel(axes: Axes, data: KeySweep, panel: _Panel, says: Says) -> None:
         told = [values[k] for k in group.cases]
         axes.plot(*((told, places) if across == "x" else (places, told)), group.marker,
                   color=group.colour, markersize=group.size, label=group.label,
-                  markerfacecolor="none" if group.open else group.colour)  # fmt: skip
+                  fillstyle=group.fill, markerfacecoloralt=SURFACE)  # fmt: skip
     for point, value, words in zip(data.points, values, says, strict=True):
         tell(axes, *((value, point.place) if across == "x" else (point.place, value)), words)
     scales.grid(axes)
@@ -139,14 +140,21 @@ def _linear_ticks(low: float, high: float) -> list[float]:
 
 
 def _groups(data: KeySweep) -> list[_Group]:
-    """The cases by how they ended, those that meet by their base as well."""
+    """The cases by how they ended; those that meet by base too, half filled if by a waiver."""
     found = []
-    for kind in sorted({p.kind for p in data.points if p.verdict == "meets"}):
-        which = f": {shortened(data.kinds[kind], 26)}" if data.kinds else ""
-        chosen = [k for k, p in enumerate(data.points) if p.verdict == "meets" and p.kind == kind]
+    meeting = {(p.kind, p.waived) for p in data.points if p.verdict == "meets"}
+    for kind, waived in sorted(meeting):
+        which = ", waived" if waived else ""
+        which += f": {shortened(data.kinds[kind], 26)}" if data.kinds else ""
+        chosen = [
+            k
+            for k, p in enumerate(data.points)
+            if p.verdict == "meets" and (p.kind, p.waived) == (kind, waived)
+        ]
         style = SHAPES[kind % len(SHAPES)], SERIES[kind % len(SERIES)]
         size = 5.0 + 3.0 * kind  # one around the other, where bases come to the same
-        found.append(_Group(f"meets{which} ({len(chosen)})", *style, chosen, size, kind > 0))
+        fill: Fill = "left" if waived else "none" if kind else "full"
+        found.append(_Group(f"meets{which} ({len(chosen)})", *style, chosen, size, fill))
     for verdict, (marker, colour, word) in _MARKS.items():
         chosen = [k for k, point in enumerate(data.points) if point.verdict == verdict]
         if chosen:

@@ -15,6 +15,7 @@ from syncline_design.report.document import (
     Group,
     Items,
     Node,
+    Outcome,
     Text,
     given,
     provenance,
@@ -177,9 +178,9 @@ def _says(
 ) -> list[tuple[str, str]]:
     """A case in words: number, setting, answer, price, error, payload."""
     values = [(short_key(f.key), shown_value(f, brief.labels[i])) for i, f in several]
-    found = [("Case", str(brief.number)), *values, ("Verdict", _word(brief))]
-    if brief.failing:
-        found.append(("Fails", ", ".join(brief.failing)))
+    found = [("Case", str(brief.number)), *values, ("Verdict", _ended(brief).word)]
+    if failing := _failing(brief):
+        found.append(("Fails", failing))
     if brief.cost is not None:
         found.append(("Price", numbers.money(brief.cost, brief.currency)))
     if brief.error_m is not None:
@@ -290,7 +291,7 @@ def _case_table(summary: StudySummary) -> Table:
     many = len(result.study.bases) > 1
     rows = []
     for brief in summary.briefs[:MOST_CASES]:
-        shown = with_waived(replace(OUTCOMES[brief.verdict], word=_word(brief)), brief.waived)
+        shown = _ended(brief)
         payload = ", ".join(pick.name for pick in brief.picks)
         why = payload or visible(reason(result.case(brief.number - 1)))
         named = [Cell(result.study.bases[brief.base].name)] if many else []
@@ -312,9 +313,10 @@ def _case_table(summary: StudySummary) -> Table:
     return table("All cases", heads, rows, note)
 
 
-def _word(brief: Brief) -> str:
-    """How a case ended, in the words of legend and headline."""
-    return "no verdict" if brief.verdict == "indeterminate" else brief.verdict
+def _ended(brief: Brief) -> Outcome:
+    """How a case ended, in the words of legend and headline, and what of it is waived."""
+    word = "no verdict" if brief.verdict == "indeterminate" else brief.verdict
+    return with_waived(replace(OUTCOMES[brief.verdict], word=word), brief.waived)
 
 
 def _refused(summary: StudySummary) -> list[Node]:

@@ -125,7 +125,8 @@ def _place(axis: ScatterAxis, text: str) -> float:
 class SweptCase:
     """One case: where its value lies, how it ended, what its design costs and how far it errs.
 
-    kind: the place of its base, 0 where these are too many to be told apart.
+    kind: the place of its base, 0 where these are too many to be told apart.  waived: it meets
+    all but what a waiver covers.
     """
 
     place: float
@@ -133,6 +134,7 @@ class SweptCase:
     cost: float | None
     error_m: float | None
     kind: int
+    waived: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +161,7 @@ def along(summary: StudySummary) -> KeySweep | None:
             brief.cost,
             brief.error_m,
             brief.base if kinds else 0,
+            bool(brief.waived),
         )
         for brief in summary.briefs
     )
