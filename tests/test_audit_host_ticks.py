@@ -44,3 +44,22 @@ def test_a_step_under_a_hosts_ticks_is_one(seed: int, first_s: float, begin_s: f
     found = of(at + 0.004 * (at > begin_s), receive)
     assert [fault.fault for fault in found.faults] == ["step"]
     assert found.faults[0].parameters["seconds"] == pytest.approx(0.004, abs=1e-4)
+
+
+@pytest.mark.parametrize("seed", [306, 416, 924])
+def test_a_second_of_later_receipts_at_a_hosts_ticks_is_no_step_of_nothing(seed: int) -> None:
+    """A 30 Hz sensor at ticks of 10 ms, read at others: for a second seven messages in ten are
+    a tick late, and no stretch tells by how much between the moments that messages tell."""
+    rng = np.random.default_rng(seed)
+    at = np.ceil(np.arange(1800) / 30.0 / TICK_S - 1e-6) * TICK_S
+    delay = rng.gamma(2.0, 0.002, at.size)
+    begin_s, length_s = rng.uniform(10.0, 50.0), rng.uniform(0.3, 1.2)
+    during = (at > begin_s) & (at < begin_s + length_s)
+    later = rng.uniform(0.003, 0.012)
+    delay[during] += later * (rng.random(int(during.sum())) < 0.7)
+    arrived = np.maximum.accumulate(at + 0.07 + delay)
+    ticks = np.ceil(arrived / TICK_S) * TICK_S
+    receive = np.sort(ticks + np.abs(rng.normal(0.0, 6e-5, at.size)))
+    found = [f for f in of(at, receive).faults if f.fault == "step"]
+    assert all(abs(float(f.parameters["seconds"])) > 5e-4 for f in found)
+    assert all((f.to_s or 0.0) > (f.from_s or 0.0) for f in found)

@@ -147,6 +147,13 @@ def believed(shape: Shape, blocks: Blocks, least_s: float) -> bool:
     )
 
 
+def has_size(shape: Shape, least_s: float) -> bool:
+    """Whether anything is left of a step once its edges are known to the message: blocks that hold
+    both sides of an edge tell no size, and a short episode may lie in such alone."""
+    jumps = shape.kind in ("step", "episode", "relock")
+    return not jumps or abs(shape.size_s) > max(shape.sigma_s, least_s)
+
+
 def _seen(shape: Shape, blocks: Blocks) -> bool:
     """Whether what an episode does is seen in enough blocks, and not while the host was busy."""
     away = np.abs(shape.at(blocks.time_s)) > 0.1

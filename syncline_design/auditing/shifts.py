@@ -19,7 +19,7 @@ from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.host_ticks import longest_tick, moved_together, ticks_of
 from syncline_design.auditing.jumps import without_jumps
 from syncline_design.auditing.lasting_jumps import Jump
-from syncline_design.auditing.levels import SURE, believed, polished, shapes_of
+from syncline_design.auditing.levels import SURE, believed, has_size, polished, shapes_of
 from syncline_design.auditing.locks import without_locks
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.plain_step import without_plain_step
@@ -144,6 +144,8 @@ def _slow_shifts(
     judged = [(s, side) for s, side in judged if side == "stamp" or abs(s.size_s) > beat_s]
     found, sides = tuple(shape for shape, _ in judged), [side for _, side in judged]
     found = polished(found, [side == "stamp" for side in sides], blocks)
+    sides = [side for s, side in zip(found, sides, strict=True) if has_size(s, least_s)]
+    found = tuple(s for s in found if has_size(s, least_s))
     count = None if hidden else witness.witness_of(series, pace, blocks)
     sides = witness.sides(count, found, sides)
     sharp = [s.kind in ("step", "episode") and witness.sharp(s, time_s, late) for s in found]
