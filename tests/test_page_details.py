@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import re
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,10 +15,12 @@ from browsing import Opened
 from html_page import Page
 from study_specs import write
 from syncline_design.comparison.acceptance import AssumptionResult
+from syncline_design.report import on_plan
 from syncline_design.report.charts_plan import beside
 from syncline_design.report.document import Document, Outcome, Text, pins, section, show
 from syncline_design.report.numbers import typeset
 from syncline_design.report.on_acceptance import assumptions_table
+from syncline_design.report.on_diff import _standing
 from syncline_design.report.render_html import html
 from syncline_design.report.studies import render_study
 from syncline_design.report.table import Cell, table
@@ -279,3 +282,22 @@ def test_what_a_finger_asked_for_stays_until_it_asks_anew(browser: Any, tmp_path
         assert opened.page.query_selector(".tip") is not None
         opened.page.touchscreen.tap(10, box["y"] - 5)
         opened.page.wait_for_function("() => !document.querySelector('.tip')")
+
+
+def test_a_limit_that_no_spec_writes_is_not_said_to_be_no_longer_required() -> None:
+    """A verdict without a design has no row for it, though it is asked for as before."""
+    implied, written = (cast(Any, SimpleNamespace(line=line)) for line in (None, 4))
+    assert _standing(None, implied).text == "no design to judge"
+    assert _standing(None, written).text == "not required"
+
+
+@pytest.mark.parametrize(("sigma", "said"), [(0.3e-3, "never told apart"), (2e-3, "never")])
+def test_a_plan_that_is_sharp_and_never_enough_says_why(
+    monkeypatch: pytest.MonkeyPatch, sigma: float, said: str
+) -> None:
+    key = "latency_s(position)"
+    monkeypatch.setattr(on_plan, "_shown", lambda _: [key])
+    monkeypatch.setattr(on_plan, "_column_sizes", lambda _: {key: 1e-3})
+    found = cast(Any, SimpleNamespace(reached=True))
+    row = on_plan._standard_row("straight", found, {key: sigma}, "", None, {key: 1e-3})
+    assert cast(Cell, row[1]).text == said

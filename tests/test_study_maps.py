@@ -16,7 +16,7 @@ from browsing import Opened
 from study_specs import SPEC, write
 from syncline_design.report.charts_along import over_key
 from syncline_design.report.charts_study import cost_map, sampled_cases
-from syncline_design.report.on_study import on_study
+from syncline_design.report.on_study import _common, on_study
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown_table
@@ -221,6 +221,16 @@ def test_a_waived_miss_is_half_filled_and_said(tmp_path: Path) -> None:
     assert "meets, waived (2)" in page
     assert "meets, COST-1 waived" in page, "the words of the figure"
     assert "Fails" not in page
+
+
+def test_a_front_that_some_cases_share_is_not_said_to_be_of_every_case(tmp_path: Path) -> None:
+    result = done(tmp_path, ONE.format(key='"stages[uav].distance": [30 m, 60 m, 90 m]'))
+    summary = summarise(result)
+    numbers_of = [brief.number for brief in summary.briefs]
+    shared = replace(summary.fronts[0], cases=tuple(numbers_of[:2]))
+    assert _common(summary, shared) == "case 1 and 1 more"
+    assert _common(summary, replace(shared, cases=tuple(numbers_of))) == "every case"
+    assert _common(summary, replace(shared, cases=(2,))) == "uav.distance 60 m"
 
 
 def test_a_terminal_tells_why_cases_cannot_be_as_combined(tmp_path: Path) -> None:

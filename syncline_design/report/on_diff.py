@@ -268,8 +268,8 @@ def _margin_row(entry: RequirementChange) -> tuple[Cell | str, ...]:
     return (
         Cell(entry.id),
         _limited(entry),
-        _standing(entry.old),
-        _standing(entry.new),
+        _standing(entry.old, entry.new),
+        _standing(entry.new, entry.old),
     )
 
 
@@ -281,10 +281,14 @@ def _limited(entry: RequirementChange) -> str:
     return kind_words(entry.kind, *told.pop())
 
 
-def _standing(row: Standing | None) -> Cell:
-    """`0.29 m of 0.3 m` with the requirement's status as colour and symbol."""
+def _standing(row: Standing | None, other: Standing | None) -> Cell:
+    """`0.29 m of 0.3 m` with the requirement's status as colour and symbol.
+
+    other: the same on the other side; a limit that no spec writes has a row of designs alone.
+    """
     if row is None:
-        return Cell("not required")
+        implied = other is not None and other.line is None
+        return Cell("no design to judge" if implied else "not required")
     state = status_word(row.status, waived=bool(row.waived))
     shown = f"{numbers.held(row.value, row)} of {numbers.limit(row)}"
     return Cell(f"{shown}, {state.word}", row.value, state.tone, state.mark)

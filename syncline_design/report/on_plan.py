@@ -194,7 +194,7 @@ def _standard(found: Plan) -> list[Node]:
     minutes = found.duration_s / 60.0 if found.reached else None
     rows = [_standard_row("this drive", found, own.sigma, pair_figure(own), minutes)]
     rows += [
-        _standard_row(one.name, found, one.sigma, pair_figure(one), one.minutes)
+        _standard_row(one.name, found, one.sigma, pair_figure(one), one.minutes, own.sigma)
         for one in found.standard
     ]
     heads = ("Plan", "Until reached #", *(f"{parameter(k)} #" for k in keys),
@@ -208,11 +208,14 @@ def _standard(found: Plan) -> list[Node]:
 
 
 def _standard_row(
-    name: str, found: Plan, sigma: Mapping[str, float], of_pair: str, minutes: float | None
-) -> tuple[Cell | str, ...]:
+    name: str, found: Plan, sigma: Mapping[str, float], of_pair: str, minutes: float | None,
+    own: Mapping[str, float] | None = None,
+) -> tuple[Cell | str, ...]:  # fmt: skip
+    """A plan's row; own: the uncertainties with which this drive reaches what is asked."""
     sizes = _column_sizes(found)
-    reached = Cell("never" if minutes is None else numbers.drive_time(minutes),
-                   _sort(minutes))  # fmt: skip
+    sharp = own is not None and found.reached and all(sigma[k] <= own[k] for k in _shown(found))
+    never = "never told apart" if sharp else "never"
+    reached = Cell(never if minutes is None else numbers.drive_time(minutes), _sort(minutes))
     return (
         name,
         reached,

@@ -235,7 +235,11 @@ def _common(summary: StudySummary, front: StudyFront) -> str:
         values = {brief.labels[place] for brief in chosen}
         if len(values) == 1:
             parts.append(setting(factor, values.pop()))
-    return visible(", ".join(parts)) or "every case"
+    if parts:
+        return visible(", ".join(parts))
+    if len(chosen) == len(summary.briefs):
+        return "every case"
+    return f"case {chosen[0].number} and {numbers.count(len(chosen) - 1)} more"
 
 
 def _name(summary: StudySummary, front: StudyFront) -> tuple[str, str]:
