@@ -139,18 +139,23 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
     width = min(spread(late), spread(late[_APART:] - late[:-_APART]))  # no slow course enters
     floor = max(noise, _SHARE * width)
     late = np.where(held_up(pace.interval, late), np.nan, late)
-    first = _sizes(pace, late, odd, odd[off_here[odd]], off_here, (width, floor))
+    first = _undoubted(_sizes(pace, late, odd, odd[off_here[odd]], off_here, (width, floor)))
     edges = np.asarray([j.place - 1 for j in first], np.intp)
-    found = _sizes(pace, late, odd, edges, off_here, (width, floor))
+    found = _undoubted(_sizes(pace, late, odd, edges, off_here, (width, floor)))
     equal = _equal(pace, late, odd[off_here[odd]], (width, floor))
     alone = {jump.place for jump in equal}
-    found = [j for j in found if j.place not in alone and (not j.doubted or _goes_back(j, found))]
+    found = [j for j in found if j.place not in alone]
     return sorted([*equal, *found], key=lambda j: j.place)
 
 
-def _goes_back(jump: Jump, found: list[Jump]) -> bool:
-    """Whether another takes it back, which lost messages never do."""
-    return any(abs(one.size_s + jump.size_s) < _EQUAL * abs(jump.size_s) for one in found)
+def _undoubted(found: list[Jump]) -> list[Jump]:
+    """Those that nothing doubts, and that another takes back, which lost messages never do."""
+    return [
+        j
+        for j in found
+        if not j.doubted
+        or any(abs(one.size_s + j.size_s) < _EQUAL * abs(j.size_s) for one in found)
+    ]
 
 
 def _equal(
@@ -258,7 +263,8 @@ def _sizes(
             continue  # receipts jumped where messages are lost: stamps keep their rhythm
         chance = whole and abs(size) < _CHANCE * width
         if not chance or abs(size + _floor(*sides)) < alike:
-            doubted = chance and abs(size + _loaded_floor(*sides)) >= alike - sure
+            lost = whole and size > 0.0  # a hole of whole intervals, which a loss leaves as well
+            doubted = (chance or lost) and not _lasts(size, *sides, alike - sure)
             size = size if uneven < 2.0 * sure else -moved
             found.append(Jump(int(k) + 1, size, doubted=doubted))
     return found
@@ -273,10 +279,21 @@ def _floor(before: Array, after: Array) -> float:
     return float(other - one)
 
 
-def _loaded_floor(before: Array, after: Array) -> float:
-    """By how much the quickest of very many are later: a load of the host holds up hundreds by
-    more than an interval, and not all of thousands."""
-    return float(after[:_LOADED].min() - before[-_LOADED:].min())
+def _lasts(size_s: float, before: Array, after: Array, alike_s: float) -> bool:
+    """Whether the quickest of very many are later by a jump, with their drift or without: a load of
+    the host holds up hundreds by more than an interval, and not all of thousands."""
+    one, other = before[-_LOADED:], after[:_LOADED]
+    drift = min(_drift(one), _drift(other), key=abs)
+    flat = one + drift * np.arange(one.size - 1, -1, -1)
+    level = other - drift * np.arange(1, other.size + 1)
+    moved = (other.min() - one.min(), level.min() - flat.min())
+    return any(abs(size_s + float(floor)) < alike_s for floor in moved)
+
+
+def _drift(late: Array) -> float:
+    """By how much more each message is late than the one before [s]; 0 of few."""
+    lag = late.size // 4
+    return float(np.median(late[lag:] - late[:-lag])) / lag if lag >= _BESIDE else 0.0
 
 
 def _paired(found: list[Jump], jitter_s: float) -> list[Jump]:
