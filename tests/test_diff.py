@@ -134,6 +134,21 @@ def test_several_changes_say_which_one_does_it(files: tuple[Path, Path]) -> None
     assert "alone: now has no design that meets its requirements" in console(on_diff(data))
 
 
+def test_a_key_that_was_taken_out_is_tried_alone_too(files: tuple[Path, Path]) -> None:
+    """A waiver that is gone turns the verdict, the other change does not."""
+    old, new = files
+    kept = "limit: 100 EUR, waiver: {reason: paper, expires: 2999-01-31}"
+    change(old, ("limit: 100000 EUR", kept))
+    change(new, ("limit: 100000 EUR", "limit: 100 EUR"), DISTANCE)
+    data = diff(old, new, PLAIN)
+    effects = {c.key: c.effect and c.effect.verdict for c in data.causes}
+    gone, nearer = effects["requirements[COST-1].waiver"], effects["stages[uav].distance"]
+    assert gone is not None
+    assert nearer is not None
+    assert (gone.old, gone.new) == ("meets", "infeasible")
+    assert nearer.new == "meets"
+
+
 def test_a_simulated_limit_alone_does_what_checking_it_alone_says(files: tuple[Path, Path]) -> None:
     """Its verdict alone is that of `check` on a spec with nothing but that change."""
     old, new = files

@@ -21,7 +21,7 @@ from syncline_design.machine.records import Json
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.files import Collection
-from syncline_design.spec.keys import PLATFORM_KEYS, label, put
+from syncline_design.spec.keys import PLATFORM_KEYS, label, put, without
 from syncline_design.spec.load import BadInput, catalogs_of, load_document
 from syncline_design.spec.spec import Requirement
 from syncline_design.spec.yaml_text import KeyPath, ParsedFile, parse
@@ -127,8 +127,7 @@ def _spec_causes(old: Any, new: Any, path: KeyPath, shown: str) -> Found:
     if name is not None and isinstance(old, tuple) and isinstance(new, tuple):
         yield from _named_causes(old, new, path, shown, name)
         return
-    tried = None if new is _ABSENT else path
-    yield Cause(shown, _text(old), _text(new)), tried
+    yield Cause(shown, _text(old), _text(new)), path
 
 
 def _named_causes(
@@ -275,11 +274,11 @@ def _tried(
     whole = place[2:] == ("platform",)
     there = after.document.data if whole else _expanded(after)
     value = _value_there(there, place, original)
-    if value is _ABSENT:
+    if value is _ABSENT and cause.new is not None:
         return cause
     try:
         in_force().check()
-        data = put(original, place, value)
+        data = without(original, place) if value is _ABSENT else put(original, place, value)
         document = replace(before.document, data=data)
         path = before.case.path
         same = before.catalogs if place[0] != "catalogs" else None

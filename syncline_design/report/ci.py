@@ -103,12 +103,21 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
     place = (row.line or 1, row.column or 1)
     known, why = verdict.baseline, waiver_text(row) if level == "waived" else ""
     if level == "fail" and row.waiver and row.waiver.expired:
-        message += f"; {waiver_text(row)}"
+        message = _with(message, waiver_text(row))
     if known is not None and level in ("fail", "undecided") and known.forgives(row.id):
         level, why = "known", _no_worse(known)
     elif known is not None and level != "pass" and not known.forgives(row.id):
-        message += _then(known, row)
+        message = _with(message, _then(known, row))
     return Notice(level, row.kind, row.id, verdict.file, *place, message, why, _figures(row))
+
+
+def _with(message: str, more: str) -> str:
+    """A message with what else is to be said, after its last stop if it has one."""
+    if not more:
+        return message
+    if message.endswith("."):
+        return f"{message} {more[0].upper()}{more[1:]}."
+    return f"{message}; {more}"
 
 
 def _no_worse(known: Baseline) -> str:
@@ -121,7 +130,7 @@ def _then(known: Baseline, row: RequirementResult) -> str:
     if was is None or was.value is None:
         return ""
     value, limit = numbers.held(was.value, was), numbers.limit(was)
-    return f"; in {known.file} it was {value} of {limit}"
+    return f"in {known.file} it was {value} of {limit}"
 
 
 def _figures(row: RequirementResult) -> tuple[tuple[str, str], ...]:

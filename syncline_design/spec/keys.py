@@ -132,6 +132,21 @@ def put(data: Any, path: KeyPath, value: Any) -> Any:
     return kept
 
 
+def without(data: Any, path: KeyPath) -> Any:
+    """A copy of the data without the key at a place, which is there."""
+    step, rest = path[0], path[1:]
+    if isinstance(step, int):
+        items = list(data)
+        items[step] = without(items[step], rest)
+        return tuple(items)
+    kept = dict(data)
+    if rest:
+        kept[step] = without(kept[step], rest)
+    else:
+        del kept[step]
+    return kept
+
+
 def value_at(data: Any, path: KeyPath) -> Any:
     """What a spec's data hold at a place; None where there is nothing."""
     for step in path:
