@@ -14,6 +14,7 @@ from html_page import Page
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.report.ci import notices
+from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
 from syncline_design.report.several import summary_line
@@ -217,6 +218,22 @@ def test_a_spec_that_stays_infeasible_has_no_further_test_case(tmp_path: Path) -
     assert {one.justification for one in known if one.level == "known"} == {
         "no worse than in old.json"
     }
+
+
+def test_only_what_is_in_the_way_got_worse_and_what_passes_again_better(tmp_path: Path) -> None:
+    infeasible = verdict_of(tmp_path, OPEN)
+    meets = verdict_of(tmp_path, changed(OPEN, ("limit: 5 cm", "limit: 9 m")))
+    fell = against(infeasible, [meets], "old.json")
+    assert fell.baseline is not None
+    assert fell.baseline.worse
+    kinds = {one.id: one.change for one in fell.baseline.requirements}
+    assert kinds == {"ACC-1": "worse", "SYNC-1": "same", "COST-1": "worse"}
+    text = Page(html(on_verdict(fell))).text.partition("Against the baseline")[2]
+    assert "SYNC-1 not judged" in " ".join(text.split())
+    rose = against(meets, [infeasible], "old.json").baseline
+    assert rose is not None
+    kinds = {one.id: one.change for one in rose.requirements}
+    assert kinds == dict.fromkeys(("ACC-1", "SYNC-1", "COST-1"), "better")
 
 
 def test_an_implied_limit_is_neither_gone_nor_new_where_no_design_is(tmp_path: Path) -> None:

@@ -72,6 +72,8 @@ def since(verdict: Verdict) -> Table | None:
         word = None if row is None else status_of(row)
         then = None if was is None else status_word(was.status, waived=bool(was.waived))
         since = SINCE[one.change]
+        if one.change == "same" and word is STATUSES["indeterminate"] and verdict.design is None:
+            since = replace(word, word="not judged")
         if one.change == "worse" and word is STATUSES["waived"]:
             since = replace(since, tone=word.tone, word=f"{since.word}, {word.word}")
         rows.append((

@@ -83,8 +83,10 @@ def _without_design(
     Where neither has one, whether the requirement is a part of what cannot be met; then its limit.
     """
     if row.status == "pass":
-        return "same"
+        return _word(_standing(row) - _standing(was))
     if verdict.verdict != before.verdict:
+        if row.status == "indeterminate" and verdict.design is None:
+            return "same"  # no part of what cannot be met, and no design to judge it by
         return "worse" if _fell(verdict, before) else "better"
     step = _standing(row) - _standing(was)
     if step == 0 and row.status == "fail" and row.unit == was.unit:
