@@ -251,7 +251,7 @@ def test_timelines_that_differ_between_stages_of_one_vehicle_are_told_of(
     [
         (0.2, "2999-01-01", "\u25d0 waived", "waived until 2999-01-01: trial"),
         (0.2, "2021-01-01", "\u2717 fail", "waiver expired on 2021-01-01: trial"),
-        (9.0, "2999-01-01", "\u2713 pass", "waived until 2999-01-01: trial"),
+        (9.0, "2999-01-01", "\u2713 pass", "its waiver (until 2999-01-01: trial) is not needed"),
     ],
 )
 def test_console_and_csv_tell_a_waived_requirement_from_a_failed_one(
