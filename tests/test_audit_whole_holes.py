@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from syncline_design.auditing.cadence import cadence
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Series, series_of
 from syncline_design.auditing.shifts import without_shifts
@@ -67,13 +66,3 @@ def test_a_step_of_an_interval_beside_a_swell_is_named(rate: float) -> None:
         assert fault.fault == "step"
         assert fault.parameters["seconds"] == pytest.approx(1.0 / rate, rel=0.01)
         assert fault.from_s == pytest.approx(at - t[0], abs=0.2 + 2.0 / rate)
-
-
-def test_the_last_messages_of_a_log_later_at_once_are_no_drift() -> None:
-    """The stamps go on at a + kT, with holes of whole intervals where messages are lost."""
-    for seed in range(24):
-        rng = np.random.default_rng([seed, 5])
-        t = measured(rng, 5.0, 0.08)
-        later = (t > 100.0 - rng.uniform(3.0, 6.0)) * rng.uniform(0.2, 0.9)
-        assert not shifts(t, came(t, rng, 0.01, later)), seed
-        assert cadence(series(t, t)).regular

@@ -38,8 +38,6 @@ _MOST_STRETCHES: Final = 5000
 _GROWTH: Final = 2.0  # of irregularity over 16 intervals against over one: a rhythm 1, a walk 4
 _EXACT: Final = 1e-4  # of an interval: irregularities that matter nowhere
 _HOLE: Final = 0.85  # of an interval: more than a late message
-_EVENLY: Final = 10.0  # times its jitter: how near to whole intervals holes of losses are
-_LEAST_S: Final = 2e-5
 _WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
 _AS_EVER: Final = 0.5  # of a hole's messages that are not missing among receipts
 _IN_A_ROW: Final = 8  # intervals that are lengthened alike: no chance losses
@@ -267,12 +265,6 @@ def _as_ever(series: Series, pace: Cadence, lost: Array) -> Mask:
         expected = (last - first) / NS / pace.period_s
         out[k] = expected - came < _AS_EVER * lost[k]
     return out
-
-
-def lost_between(pace: Cadence) -> Mask:
-    """Intervals that are several whole ones of the sensor, as lost messages leave them."""
-    off = np.abs(pace.interval - pace.steps * pace.period_s)
-    return np.asarray((pace.steps > 1.0) & (off <= max(_EVENLY * pace.jitter_s, _LEAST_S)))
 
 
 def at_another_rate(steps: Array) -> Mask:

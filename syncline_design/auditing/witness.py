@@ -15,7 +15,7 @@ from typing import Final, Literal
 import numpy as np
 
 from syncline_design.auditing.blocks import Blocks
-from syncline_design.auditing.cadence import Cadence, lost_between
+from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.series import Array, Series, median, scatter, seconds
@@ -76,14 +76,11 @@ def _counted(series: Series, pace: Cadence) -> Array:
     late = seconds((series.receive - series.stamp)[pace.places])
     steps = np.maximum(pace.steps, 1.0)
     by_receipt = np.maximum(np.round(passed / pace.period_s), 1.0)
-    lost = lost_between(pace)
     odd = np.flatnonzero((steps != by_receipt) & (pace.steps != 1.0))
     for k in odd[:_MOST_ODD]:
         before, after = late[max(0, k - 7) : k + 1], late[k + 1 : k + 9]
         moved = float(np.median(before) - np.median(after))
         jump = float(pace.interval[k] - by_receipt[k] * pace.period_s)
-        if by_receipt[k] > steps[k] and lost[k]:
-            continue  # receipts jumped where messages are lost: stamps keep their rhythm
         if abs(moved - jump) < 0.5 * pace.period_s:
             steps[k] = by_receipt[k]
     return steps
