@@ -165,14 +165,12 @@ def _groups(data: KeySweep) -> list[_Group]:
 def _key_axis(axes: Axes, data: KeySweep) -> None:
     """The values of the key: figures below, words beside."""
     axis = data.axis
-    label = shortened(short_key(axis.key), 60) + (f" [{axis.unit}]" if axis.unit else "")
     if axis.words:
         scales.set_ticks(axes, "y", range(len(axis.words)),
                          lambda p: shortened(axis.words[round(p)], MOST_WORD))  # fmt: skip
         axes.set_ylim(len(axis.words) - 0.4, -0.6)
-        axes.set_ylabel("")
         return
-    axes.set_xlabel(label)
+    axes.set_xlabel(shortened(short_key(axis.key), 60) + (f" [{axis.unit}]" if axis.unit else ""))
     if axis.log:
         axes.set_xscale("log")
         scales.set_ticks(axes, "x", scales.log_ticks(*axes.get_xlim()),
