@@ -9,7 +9,14 @@ from typing import Final, Literal
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
-from syncline_design.report.verdict_words import kind_text, margin_text, outcome, waiver_text
+from syncline_design.report.verdict_words import (
+    kind_text,
+    margin_text,
+    outcome,
+    since_sentence,
+    status_id,
+    waiver_text,
+)
 from syncline_design.verdict.obstacle import obstacle_sentence, remedies_sentence, requirement_name
 from syncline_design.verdict.since import Baseline
 from syncline_design.verdict.tree import (
@@ -19,7 +26,6 @@ from syncline_design.verdict.tree import (
     Refused,
     RequirementResult,
     Verdict,
-    waived_misses,
 )
 
 Level = Literal["pass", "fail", "undecided", "not_reached", "waived", "known", "warning"]
@@ -67,6 +73,14 @@ def _requirements(verdict: Verdict) -> Iterator[Notice]:
             found = _requirement(row, verdict)
             message = f"mission {mission.name}: {found.message}"
             yield replace(found, id=f"{mission.name} {row.id}", message=message)
+
+
+def closing_words(verdict: Checked) -> str:
+    """The outcome and, with a baseline, what became of it since."""
+    said = outcome(verdict).word
+    if isinstance(verdict, Refused) or verdict.baseline is None:
+        return said
+    return f"{said}. {since_sentence(verdict.baseline, verdict)}"
 
 
 def _is_told(found: list[Notice], verdict: Verdict) -> bool:
@@ -140,7 +154,7 @@ def _figures(row: RequirementResult) -> tuple[tuple[str, str], ...]:
     return (
         *shown,
         ("unit", row.unit),
-        ("status", "waived" if waived_misses([row]) else row.status),
+        ("status", status_id(row)),
     )
 
 

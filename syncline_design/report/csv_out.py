@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import spreadsheet_safe
-from syncline_design.report.verdict_words import waiver_text
-from syncline_design.verdict.tree import Checked, Refused, RequirementResult, Verdict
+from syncline_design.report.verdict_words import since_word, status_id, waiver_text
+from syncline_design.verdict.since import RequirementSince
+from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 _COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value", "limit", "unit",
-            "margin", "line", "warnings", "waiver")  # fmt: skip
+            "margin", "line", "warnings", "waiver", "since_baseline", "status_then", "value_then",
+            "limit_then", "unit_then")  # fmt: skip
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
@@ -57,7 +59,7 @@ def render_csv(verdicts: Sequence[Checked]) -> str:
         found = (
             []
             if isinstance(verdict, Refused)
-            else [{**head, **_about(verdict, row)} for row in verdict.requirements]
+            else [{**head, **about} for about in (*_rows(verdict), *_gone(verdict))]
         )
         rows += found or [head]
     return csv_text(_COLUMNS, rows)
@@ -82,8 +84,34 @@ def render_bill(verdicts: Sequence[Checked]) -> str:
     return csv_text(_BILL, rows)
 
 
-def _about(verdict: Verdict, row: RequirementResult) -> dict[str, Any]:
-    """A requirement, the codes of the warnings about it, and what its waiver does."""
-    codes = " ".join(w.code for w in verdict.warnings if w.requirement == row.id)
-    told = {"requirement": row.id, "warnings": codes, "waiver": waiver_text(row)}
-    return row.to_json() | told
+def _rows(verdict: Verdict) -> Iterator[dict[str, Any]]:
+    """Requirements with the codes of the warnings about them, what their waivers do, and what
+    became of them since the baseline; a miss under a waiver in force is `waived`, as in JUnit."""
+    since = _since(verdict)
+    for row in verdict.requirements:
+        codes = " ".join(w.code for w in verdict.warnings if w.requirement == row.id)
+        told = {"requirement": row.id, "warnings": codes, "waiver": waiver_text(row)}
+        earlier = _then(verdict, since[row.id]) if row.id in since else {}
+        yield row.to_json() | told | {"status": status_id(row)} | earlier
+
+
+def _gone(verdict: Verdict) -> Iterator[dict[str, Any]]:
+    """Requirements that only the baseline has."""
+    for one in _since(verdict).values():
+        if one.change == "gone":
+            yield {"requirement": one.id} | _then(verdict, one)
+
+
+def _since(verdict: Verdict) -> dict[str, RequirementSince]:
+    return {one.id: one for one in verdict.baseline.requirements} if verdict.baseline else {}
+
+
+def _then(verdict: Verdict, one: RequirementSince) -> dict[str, Any]:
+    """What became of a requirement and how it stood, as the table of the baseline says it."""
+    found: dict[str, Any] = {"since_baseline": since_word(one, verdict).word}
+    if one.was is not None:
+        then = one.was
+        status = "waived" if then.waived else then.status
+        found |= {"status_then": status, "value_then": then.value}
+        found |= {"limit_then": then.limit, "unit_then": then.unit}
+    return found

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from syncline_design.report.ci import SILENT, Notice, all_notices
+from syncline_design.report.ci import SILENT, Notice, all_notices, closing_words
 from syncline_design.report.text import unticked, visible
-from syncline_design.report.verdict_words import design_sentence, outcome
+from syncline_design.report.verdict_words import design_sentence
 from syncline_design.verdict.tree import Checked
 
 _COMMANDS = {
@@ -25,7 +25,7 @@ def render_github(verdicts: Sequence[Checked]) -> str:
     """One command per notice that is no pass, then a notice with each spec's outcome."""
     lines = [github_command(f) for f in all_notices(verdicts) if f.level not in SILENT]
     for verdict in verdicts:
-        text = f"{outcome(verdict).word}. {design_sentence(verdict)}"
+        text = f"{closing_words(verdict).removesuffix('.')}. {design_sentence(verdict)}"
         lines.append(github_notice(verdict.name, verdict.file, text))
     return "\n".join(lines) + "\n"
 

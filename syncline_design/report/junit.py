@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
 
-from syncline_design.report.ci import Notice, notices
+from syncline_design.report.ci import Notice, closing_words, notices
 from syncline_design.report.text import unticked, visible
-from syncline_design.report.verdict_words import outcome
 from syncline_design.verdict.tree import Checked
 
 
@@ -18,7 +17,7 @@ def render_junit(verdicts: Sequence[Checked]) -> str:
     Times are 0 and no timestamp is given: the same verdict gives the same bytes.
     """
     return junit_text(
-        suite_of(verdict.name, verdict.file, notices(verdict), outcome(verdict).word)
+        suite_of(verdict.name, verdict.file, notices(verdict), closing_words(verdict))
         for verdict in verdicts
     )
 

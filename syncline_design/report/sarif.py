@@ -103,7 +103,7 @@ def _result(notice: Notice, rules: list[str]) -> dict[str, Any]:
     }
     if notice.level == "waived":
         result["suppressions"] = [
-            {"kind": "external", "justification": visible(unticked(notice.justification))}
+            {"kind": "inSource", "justification": visible(unticked(notice.justification))}
         ]
     elif notice.level == "known":
         result["baselineState"] = "unchanged"

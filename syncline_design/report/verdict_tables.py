@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
@@ -16,6 +15,7 @@ from syncline_design.report.verdict_words import (
     margin_text,
     relative_margin,
     selection_reason,
+    since_word,
     status_of,
     status_word,
     term_text,
@@ -24,8 +24,6 @@ from syncline_design.report.verdict_words import (
 from syncline_design.report.words import (
     LEDGER_KINDS,
     PRIMITIVES,
-    SINCE,
-    STATUSES,
     SYNC_MODELS,
     TIMELINES,
 )
@@ -71,11 +69,7 @@ def since(verdict: Verdict) -> Table | None:
         row, was = now.get(one.id), one.was
         word = None if row is None else status_of(row)
         then = None if was is None else status_word(was.status, waived=bool(was.waived))
-        since = SINCE[one.change]
-        if one.change == "same" and word is STATUSES["indeterminate"] and verdict.design is None:
-            since = replace(word, word="not judged")
-        if one.change == "worse" and word is STATUSES["waived"]:
-            since = replace(since, tone=word.tone, word=f"{since.word}, {word.word}")
+        since = since_word(one, verdict)
         rows.append((
             Cell(one.id),
             Cell(since.word, tone=since.tone),

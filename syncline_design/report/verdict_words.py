@@ -17,6 +17,7 @@ from syncline_design.report.words import (
     OUTCOMES,
     PRIMITIVES,
     QUALIFYING,
+    SINCE,
     STATUSES,
     TERMS,
 )
@@ -30,7 +31,7 @@ NAMED: Final = 6  # of those that fail, by name
 if TYPE_CHECKING:
     from syncline_design.verdict.named import NamedRole
     from syncline_design.verdict.optimization import Optimization
-    from syncline_design.verdict.since import Baseline
+    from syncline_design.verdict.since import Baseline, RequirementSince
     from syncline_design.verdict.syncline_figures import LedgerRow
     from syncline_design.verdict.tree import (
         Caution,
@@ -135,6 +136,22 @@ def status_of(row: RequirementResult) -> Outcome:
 def status_word(status: Status, *, waived: bool) -> Outcome:
     """The outcome of a requirement, by whether a waiver in force covers it."""
     return STATUSES["waived" if waived and status == "fail" else status]
+
+
+def status_id(row: RequirementResult) -> str:
+    """A requirement's status for tables and test reports: a miss that is waived is no `fail`."""
+    return "waived" if waived_misses([row]) else row.status
+
+
+def since_word(one: RequirementSince, verdict: Verdict) -> Outcome:
+    """What became of a requirement; of one that no design is there to judge, that it is not."""
+    row = next((row for row in verdict.requirements if row.id == one.id), None)
+    word, since = None if row is None else status_of(row), SINCE[one.change]
+    if one.change == "same" and word is STATUSES["indeterminate"] and verdict.design is None:
+        return replace(word, word="not judged")
+    if one.change == "worse" and word is STATUSES["waived"]:
+        return replace(since, tone=word.tone, word=f"{since.word}, {word.word}")
+    return since
 
 
 def waiver_text(row: RequirementResult) -> str:
