@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from matplotlib.figure import Figure
 
 from diagnosis_samples import CLOSED, diagnosis
 from html_page import Page
@@ -19,6 +20,7 @@ from syncline_design.report.axes import log_ticks
 from syncline_design.report.charts import WIDTH, LedgerBar, SynclineCurve, ledger, syncline
 from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
 from syncline_design.report.charts_distribution import DensityBars, error_histogram
+from syncline_design.report.charts_ways import from_above
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_findings import NAT
@@ -27,6 +29,7 @@ from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimizations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
+from syncline_design.report.svg import add_axes, draw
 from syncline_design.report.text import unbroken
 from syncline_design.report.verdict_words import failing_text, margin_text
 from syncline_design.spec.load import load_text
@@ -298,3 +301,16 @@ def test_those_that_fail_are_named_where_the_table_is_long() -> None:
     assert failing_text(rows) == "10 of 20: R1, R3, R5, R7, R9, R11 and 4 more"
     assert failing_text(rows[:8]) == ""
     assert failing_text(rows[::2]) == ""
+
+
+def test_the_axis_of_a_map_keeps_its_title_in_the_frame() -> None:
+    """Equal scales push the limits out once the box is known, here to a label `-100`."""
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        axes.plot([-35.0, 295.0], [-55.0, 215.0])
+        from_above(axes)
+
+    drawn = draw("fig-map", "Map", "a map", (WIDTH, 340.0), build).svg
+    (foot,) = re.findall(r'x="(-?[\d.]+)" y="[\d.]+" transform="rotate\(-90', drawn)
+    assert float(foot) > 9.0  # letters of 10 px stand on it, to the left

@@ -224,7 +224,7 @@ def _notes(result: Acceptance) -> list[Node]:
 
 def _evidence(result: Acceptance) -> Table:
     rows = [
-        (Cell(one.file, code=True), Cell(one.read_as), Cell(one.of), Cell(one.sha256, code=True))
+        (Cell(one.file), Cell(one.read_as), Cell(one.of), Cell(one.sha256, code=True))
         for one in result.evidence
     ]
     return table("Evidence", ("File", "Read as", "Of", "SHA-256"), rows)

@@ -169,7 +169,7 @@ def _facts(result: Audit) -> Iterator[tuple[str, str]]:
 
 def _files(name: str, files: Sequence[IncompleteFile]) -> list[Node]:
     rows = [
-        (Cell(one.file, code=True), one.reason, Cell(numbers.count(one.messages), one.messages))
+        (Cell(one.file), one.reason, Cell(numbers.count(one.messages), one.messages))
         for one in files
     ]
     return show(table(name, ("File", "Why", "Messages read #"), rows), silent=True)
@@ -319,7 +319,7 @@ def _open(result: Audit) -> list[Node]:
 
 
 def _evidence(result: Audit) -> Table:
-    rows = [(Cell(one.file, code=True), Cell(one.sha256, code=True)) for one in result.evidence]
+    rows = [(Cell(one.file), Cell(one.sha256, code=True)) for one in result.evidence]
     return table("Evidence", ("File", "SHA-256"), rows)
 
 

@@ -180,6 +180,11 @@ def _lay_out(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
+        maps = [axes for axes in figure.axes if axes.get_aspect() != "auto"]
+        for axes in maps:  # their limits, and so their labels, follow the box they are given
+            axes.apply_aspect()
+        if maps:
+            engine.execute(figure)
         figure.set_layout_engine(None)
 
 
