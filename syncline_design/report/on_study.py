@@ -16,6 +16,7 @@ from syncline_design.report.document import (
     Items,
     Node,
     Outcome,
+    Section,
     Text,
     given,
     provenance,
@@ -82,7 +83,7 @@ def on_study(result: StudyResult) -> Document:
         facts=tuple(_facts(result)),
         sections=(
             *section("heat", LEAST_COST, _heat(summary), "Least cost"),
-            *section("sampled", "Sample", _sampled(summary)),
+            *_sampled(summary),
             *section("along", _along_heading(summary), _along(summary), "One by one"),
             *section("winners", "Which sensor and method wins where, of the cases that meet",
                      winners, "What wins where"),
@@ -129,8 +130,8 @@ def _collapsed(summary: StudySummary, heat: HeatMap) -> str:
     return f"Of all values of {sentence_list(others)} the case that costs least." if others else ""
 
 
-def _sampled(summary: StudySummary) -> list[Node]:
-    """Cases drawn over two factors, where these are no grid."""
+def _sampled(summary: StudySummary) -> list[Section]:
+    """Cases drawn over two factors, where these are no grid or too fine a one for a map."""
     currency, *others = summary.currencies
     if others or heat_map(summary) is not None:
         return []
@@ -144,7 +145,10 @@ def _sampled(summary: StudySummary) -> list[Node]:
         says = [_says(one, several, summary.accuracy) for one in briefs]
         return charts_study.sampled_cases(found, currency, says)
 
-    return [Chart("sampled", draw, _sampled_caption(found))]
+    title = f"Cases over {visible(short_key(found.x.key))} and {visible(short_key(found.y.key))}"
+    return section(
+        "sampled", title, [Chart("sampled", draw, _sampled_caption(found))], "Map of cases"
+    )
 
 
 def _along_heading(summary: StudySummary) -> str:
