@@ -138,6 +138,21 @@ def test_links_inside_the_docs_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text):
         if "://" not in target:
             assert (page.parent / target).exists(), target
+            assert (page.parent / target).resolve().parent.is_relative_to(ROOT / "docs"), (
+                f"{target}: the site, which is built strictly, has pages of docs/ alone"
+            )
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=lambda path: path.name)
+def test_links_to_a_heading_find_it(page: Path) -> None:
+    """Slugs by the rule of Markdown's table of contents: small, without marks, `-` for spaces."""
+    text = page.read_text(encoding="utf-8")
+    for target, anchor in re.findall(r"\]\(([^)#\s:]*)#([^)]+)\)", text):
+        other = (page.parent / target) if target else page
+        heads = re.findall(r"^#+ (.+)$", other.read_text(encoding="utf-8"), re.M)
+        slugs = [re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", head).strip().lower())
+                 for head in heads]  # fmt: skip
+        assert anchor in slugs, f"{target}#{anchor}"
 
 
 def test_the_site_lists_every_page_and_no_other() -> None:
