@@ -79,7 +79,8 @@ def test_tails_that_are_listed_are_not_told_again(tmp_path: Path) -> None:
     tails = hidden("heavy_tails", "position", degrees_of_freedom=5.0, outlier_rate=0.0)
     jitter = hidden("timestamp_jitter", "position", std_s=0.03)
     folder = told(tmp_path, tails, jitter)
-    assert "heavy_tails" not in [c.effect.name for c in candidates(seen(folder))]
+    known = [(c.effect.name, c.sensor) for c in candidates(seen(folder))]
+    assert ("heavy_tails", "position") not in known
     found = diagnose(folder / "spec.yaml", [folder / "log.csv"], DiagnosisSettings(max_effects=1))
     assert found.verdict == "agrees"
 

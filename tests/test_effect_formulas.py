@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import norm, t
 
 from syncline_design.effects import registry
-from syncline_design.effects.record import Basis, StageRows
+from syncline_design.effects.record import ActsOn, Basis, StageRows
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Platform, Sensor, Stage, System
@@ -312,14 +312,17 @@ def test_heavy_tails_are_charged_by_the_mixtures_deviation(freedom: float, rate:
     )
     outer = 2 * (1 - rate) * float(t.pdf(far, freedom)) * far**3 / (freedom - 2.0)
     position = Sensor("p", "position", (0.01, 0.02, 0.03), NO_ERROR)
-    charged = registry()["heavy_tails"].contribute(
-        Stage("v", "v", Platform(1.0, 1.0, 1.0), position, None, None),
-        {"degrees_of_freedom": freedom, "outlier_rate": rate},
-        "position",
-        Basis(),
-    )
-    expected = (math.sqrt(inner + outer) - 1.0) * math.hypot(0.01, 0.02, 0.03)
-    assert charged.systematic_m == pytest.approx(expected, rel=1e-4)
+    ranging = Sensor("r", "ranging", (0.05, 1e-3, 1e-3), NO_ERROR)
+    sizes: dict[ActsOn, float] = {"position": math.hypot(0.01, 0.02, 0.03), "ranging": 0.05}
+    for sensor, sigma_m in sizes.items():  # of a range: along the line of sight alone
+        charged = registry()["heavy_tails"].contribute(
+            Stage("v", "v", Platform(1.0, 1.0, 1.0), position, None, ranging),
+            {"degrees_of_freedom": freedom, "outlier_rate": rate},
+            sensor,
+            Basis(distance_m=50.0),
+        )
+        expected = (math.sqrt(inner + outer) - 1.0) * sigma_m
+        assert charged.total_m(Basis(distance_m=50.0)) == pytest.approx(expected, rel=1e-4)
 
 
 def test_no_row_is_an_outlier_of_students_tails() -> None:

@@ -136,7 +136,7 @@ SINGLE: Effects = {
     ("induced_heave", "position"): {"x_m": 2.0, "y_m": -1.0, "z_m": 3.0},
 }
 ELSEWHERE = {  # heavy tails have no largest value; conventions are turned round as a whole
-    ("heavy_tails", "position"),
+    *(("heavy_tails", sensor) for sensor in ("position", "ranging")),
     *(("frame_convention", sensor) for sensor in ("position", "attitude", "ranging")),
 }
 

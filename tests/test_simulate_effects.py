@@ -234,10 +234,19 @@ def student_with_outliers(x: float) -> float:
     return 0.9 * tail + 0.1 * float(stats.chi(3).cdf(x / 0.2))
 
 
+def student_range_with_outliers(x: float) -> float:
+    """The same along the line of sight alone, of 3 cm."""
+    tail = 2.0 * float(stats.t(4.0).cdf(x / 0.03)) - 1.0
+    return 0.9 * tail + 0.1 * half_normal(0.3)(x)
+
+
 CASES |= {
     ("sound_speed", "ranging"): ({"relative_error": -0.01}, STRAIGHT, bent_by_sound(-0.01)),
     ("heavy_tails", "position"): (
         {"degrees_of_freedom": 4.0, "outlier_rate": 0.1}, NOISY, student_with_outliers
+    ),
+    ("heavy_tails", "ranging"): (
+        {"degrees_of_freedom": 4.0, "outlier_rate": 0.1}, NOISY, student_range_with_outliers
     ),
 }  # fmt: skip
 

@@ -69,7 +69,8 @@ def _sizes(view: Scene, index: int, role: str, sensor: Sensor) -> tuple[Array, A
         elif one.effect.opens == "tails":
             freedom, outliers = max(figures[0], LEAST_FREEDOM), figures[1]
             tails = (1.0 - outliers) * freedom / (freedom - 2.0)
-            usual = usual * np.sqrt(tails + outliers * OUTLIER_FACTOR**2)
+            grown = np.sqrt(tails + outliers * OUTLIER_FACTOR**2)
+            usual = usual * (np.array([grown, 1.0, 1.0]) if role == "ranging" else grown)
         elif one.effect.wanders:
             axes = DOWN if one.effect.opens == "down" else np.ones(3)
             wandering = wandering + (figures[0] * axes) ** 2

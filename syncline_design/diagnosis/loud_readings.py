@@ -47,11 +47,14 @@ class ReadingsNoise:
     is_open: bool = False
 
 
+VarianceParts = tuple[ReadingsNoise, ...]
+
+
 @dataclass(frozen=True, slots=True)
 class VarianceFit:
     """Deviations over the spec's of every part, and the cost of every row [nat]."""
 
-    parts: tuple[ReadingsNoise, ...]
+    parts: VarianceParts
     times: Array
     costs: Array
 
@@ -84,8 +87,7 @@ def loud_readings(
     """
     thin = slice(None, None, 1 + (len(error) - 1) // MOST_ROWS)
     parts = tuple(_part(sensor, range(own.shape[2]), own[thin]) for sensor, own in slopes.items())
-    size = np.sqrt(np.mean([np.trace(np.mean(one.squares, axis=0)) for one in parts]))
-    parts += tuple(_along(place, own[thin], size) for place, own in enumerate(motions))
+    parts += _motion_parts(parts, [own[thin] for own in motions])
     now, loud = fitted(error[thin], parts, fixed[thin]), dict[SensorKey, float]()
     for _ in range(MOST_ROUNDS):
         wholes = [fitted(error[thin], one, fixed[thin], now) for one in _wholes(now.parts)]
@@ -110,6 +112,21 @@ def loud_readings(
     spreads = relative_spreads(now, fixed[thin]) / np.sqrt(len(error) / len(error[thin]))
     found = (_loud(now, spreads, sensor, gain) for sensor, gain in loud.items())
     return tuple(one for one in found if one is not None)
+
+
+def each_reading(slopes: dict[SensorKey, Array], motions: Sequence[Array]) -> VarianceParts:
+    """Every reading of every sensor, and every motion, free to be of a size of its own."""
+    parts = tuple(
+        _part(sensor, (reading,), own, is_open=True)
+        for sensor, own in slopes.items()
+        for reading in range(own.shape[2])
+    )
+    return (*parts, *_motion_parts(parts, motions))
+
+
+def _motion_parts(parts: VarianceParts, motions: Sequence[Array]) -> VarianceParts:
+    size = np.sqrt(np.mean([np.trace(np.mean(one.squares, axis=0)) for one in parts]))
+    return tuple(_along(place, own, size) for place, own in enumerate(motions))
 
 
 def _part(

@@ -14,16 +14,18 @@ from syncline_design.diagnosis.finding import estimate, finding, named_finding
 from syncline_design.diagnosis.fitting import Data, Model, Opened, bounds_of
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
+    SensorKey,
     clipped,
     marginal_variance,
     precision,
 )
-from syncline_design.diagnosis.result import Finding, readings_words
-from syncline_design.diagnosis.sensor_tails import sensor_tails
+from syncline_design.diagnosis.range_tails import RANGE, RangeTails, tails_effect
+from syncline_design.diagnosis.result import Estimate, Finding, readings_words
+from syncline_design.diagnosis.sensor_tails import SensorTails, sensor_tails
 from syncline_design.diagnosis.settling import Settled
-from syncline_design.diagnosis.unlike_readings import Unlike, factor_effect
-from syncline_design.effects.record import Effect
-from syncline_design.model.figure_text import format_nats
+from syncline_design.diagnosis.unlike_readings import Unlike, factor_effect, slopes_of_readings
+from syncline_design.effects.record import OUTLIER_FACTOR, Effect
+from syncline_design.model.figure_text import format_nats, to_digits
 from syncline_design.model.known import EffectEntry
 
 
@@ -59,35 +61,63 @@ def tail_findings(final: Settled, opened: Opened, weights: Weights) -> list[Find
     effect, label = opened.candidate.effect, opened.candidate.label
     stage = data.view.system.stages[label[2]].name
     tails = sensor_tails(data, model, (stage, label[1]))
-    figures = [
-        (tails.degrees_of_freedom, tails.freedom_uncertainty),
-        (tails.outlier_rate, math.inf),
-    ]
-    shown = {
-        p.name: estimate(v, s, p.unit) for p, (v, s) in zip(effect.parameters, figures, strict=True)
-    }
+    shown = _shown_tails(effect, tails)
     size_m = _noise_size(data, model, opened)
     if not tails.scale > 1.0:
         return [named_finding(final, effect, label, shown, size_m, weights)]
-    wider = factor_effect()
     part = next(w for w in data.structure.white if w.sensor == (stage, label[1]))
     visible = np.isfinite(data.view.log.truth_m)
     own = float(np.mean(np.sum(np.einsum("nii->ni", part.covariance) * visible, axis=1)))
     core_m = math.sqrt((tails.scale**2 - 1.0) * own)
-    factor = {
-        wider.parameters[0].name: estimate(
-            tails.scale, tails.scale_uncertainty, wider.parameters[0].unit
-        )
-    }
-    values = ((wider.parameters[0].name, tails.scale),)
-    material = weights.material(core_m, EffectEntry(wider.name, label[1], stage, values))
-    words = f"a core as wide as the spec's costs {format_nats(tails.wider)}"
     size_m = math.sqrt(max(size_m**2 - core_m**2, 0.0))
     return [
         named_finding(final, effect, label, shown, size_m, weights),
-        finding(wider, label[1], stage, factor, words, tails.wider, None,
-                material=material, size_m=core_m),
-    ]  # fmt: skip
+        _wider_core(tails, (stage, label[1]), core_m, weights),
+    ]
+
+
+def _shown_tails(effect: Effect, tails: SensorTails) -> dict[str, Estimate]:
+    figures = [
+        (tails.degrees_of_freedom, tails.freedom_uncertainty, tails.freedom95),
+        (tails.outlier_rate, tails.rate_uncertainty, tails.rate95),
+    ]
+    return {
+        p.name: estimate(value, spread, p.unit, interval95=ends)
+        for p, (value, spread, ends) in zip(effect.parameters, figures, strict=True)
+    }
+
+
+def _wider_core(tails: SensorTails, key: SensorKey, core_m: float, weights: Weights) -> Finding:
+    """How much wider than the spec's the noise is that has the tails; core_m: RMS that it adds."""
+    wider, (stage, sensor) = factor_effect(), key
+    (one,) = wider.parameters
+    factor = {one.name: estimate(tails.scale, tails.scale_uncertainty, one.unit)}
+    entry = EffectEntry(wider.name, sensor, stage, ((one.name, tails.scale),))
+    words = f"a core as wide as the spec's costs {format_nats(tails.wider)}"
+    return finding(wider, sensor, stage, factor, words, tails.wider, None,
+                   material=weights.material(core_m, entry), size_m=core_m)  # fmt: skip
+
+
+def range_tail_findings(data: Data, one: RangeTails, weights: Weights) -> list[Finding]:
+    """Heavy tails of ranges, and how much wider than the spec's their core is, if it is."""
+    effect, tails, (stage, sensor) = tails_effect(), one.tails, one.sensor
+    along = slopes_of_readings(data)[one.sensor][:, :, RANGE]
+    own = np.sum(along**2 * np.isfinite(data.view.log.truth_m), axis=1)
+    wider = max(tails.scale, 1.0) ** 2
+    size_m = math.sqrt(max(float(np.mean(own * (one.growth**2 - wider))), 0.0))
+    shown = _shown_tails(effect, tails)
+    values = tuple((name, e.value) for name, e in shown.items())
+    material = weights.material(size_m, EffectEntry(effect.name, sensor, stage, values))
+    words = f"saves {format_nats(one.gain)} beside normal noise along the line of sight"
+    if tails.outlier_rate and tails.outliers > OUTLIER_FACTOR:
+        words += (f"; the outliers have {to_digits(tails.outliers, 2)} times the spec's deviation, "
+                  f"{to_digits(OUTLIER_FACTOR, 2)} times in the effect of this name")  # fmt: skip
+    found = finding(effect, sensor, stage, shown, words, one.gain, None,
+                    material=material, size_m=size_m)  # fmt: skip
+    if not tails.scale > 1.0:
+        return [found]
+    core_m = math.sqrt((wider - 1.0) * float(np.mean(own)))
+    return [found, _wider_core(tails, one.sensor, core_m, weights)]
 
 
 def episode_finding(data: Data, one: Episode, weights: Weights) -> Finding:

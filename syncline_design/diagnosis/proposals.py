@@ -25,7 +25,7 @@ from syncline_design.diagnosis.fitting import Data, Model, Opened, fit
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.knocks import MOUNTED
 from syncline_design.diagnosis.lines import LINE, best_wave
-from syncline_design.diagnosis.noise import NoiseLevel, as_specified
+from syncline_design.diagnosis.noise import NoiseLevel, SensorKey, as_specified
 from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
 from syncline_design.diagnosis.pairs import promising, standing, with_pair
 from syncline_design.diagnosis.parts import (
@@ -101,6 +101,16 @@ class Proposals:
     signatures: tuple[Signature, ...]
     states: States
     fallen: frozenset[Label] = frozenset()
+
+    @property
+    def may_have_range_tails(self) -> frozenset[SensorKey]:
+        """Ranging sensors whose heavy tails may be named."""
+        stages = self.data.view.system.stages
+        return frozenset(
+            (stages[c.stage].name, c.sensor)
+            for c in self.candidates
+            if c.effect.opens == "tails" and c.sensor == "ranging"
+        )
 
     def less(self, fallen: Collection[Label]) -> Proposals:
         """The same without effects that were tried and did not stand."""
@@ -342,9 +352,14 @@ class Proposals:
         return trials
 
     def tails_trial(self, understated: Trial) -> list[Trial]:
-        """Heavy tails, where the scatter is too large and Student's t describes it much better."""
+        """Heavy tails, where the scatter is too large and Student's t describes it much better.
+
+        Of ranges they are told by their direction (`range_tails`).
+        """
         one, model = understated.candidate, understated.model
         own = (one.sensor, one.stage)
+        if one.sensor == "ranging":
+            return []
         tails = [c for c in self.candidates
                  if c.effect.opens == "tails" and (c.sensor, c.stage) == own]  # fmt: skip
         if one.effect.opens != "factor" or not tails or tails[0].label in model.labels:

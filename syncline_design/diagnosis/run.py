@@ -39,7 +39,11 @@ from syncline_design.diagnosis.motion_columns import (
     merged_checks,
     with_slopes,
 )
-from syncline_design.diagnosis.noise_findings import episode_finding, with_unlike_readings
+from syncline_design.diagnosis.noise_findings import (
+    episode_finding,
+    range_tail_findings,
+    with_unlike_readings,
+)
 from syncline_design.diagnosis.one_delay import with_one_delay
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import (
@@ -307,6 +311,8 @@ def weigh(one: SearchedLog, promise: SpecPromise | None) -> WeighedUp:
     named = findings(result.final, faults, weights, left)
     named = with_unlike_readings(named, result.final, search.unlike or (), weights)
     named = (*named, *(episode_finding(data, one, weights) for one in search.episodes or ()))
+    for one_range in search.range_tails or ():
+        named = (*named, *range_tail_findings(data, one_range, weights))
     if untouched is not None:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
     checks = merged_checks(

@@ -26,6 +26,7 @@ from syncline_design.diagnosis.pairs import TRIED as TRIED_PAIRS
 from syncline_design.diagnosis.pairs import clear_nats, clearly_two, in_the_place, with_pair
 from syncline_design.diagnosis.parts import cut_down
 from syncline_design.diagnosis.proposals import Label, Proposals
+from syncline_design.diagnosis.range_tails import RangeTails, range_tails, with_range_tails
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.settling import Settled, borne_out, settle
 from syncline_design.diagnosis.slow_states import States, fitted_of, slow_states
@@ -74,6 +75,7 @@ class Search:
     progress: Callable[[float], None]
     episodes: tuple[Episode, ...] | None = None  # None until they were looked for
     unlike: tuple[Unlike, ...] | None = None  # the same
+    range_tails: tuple[RangeTails, ...] | None = None  # the same
 
     @property
     def data(self) -> Data:
@@ -166,7 +168,15 @@ class Search:
         )
 
     def with_uneven_noise(self, model: Model) -> bool:
-        """Look once for noise that is larger in some readings, or for a while; whether it is."""
+        """Look once for ranges far off, for noise that is larger in some readings, or for a while;
+        whether there is any."""
+        if self.range_tails is None:
+            self.range_tails = range_tails(self.data, model, self.proposals.may_have_range_tails)
+            if self.range_tails:
+                self.proposals = self.proposals.with_data(
+                    with_range_tails(self.data, self.range_tails)
+                )
+                return True
         if self.unlike is None:
             wanted = factor_effect().name not in self.settings.exclude_effects
             self.unlike = unlike_readings(self.data, model) if wanted else ()

@@ -16,7 +16,7 @@ from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model, data_of
 from syncline_design.diagnosis.loud_readings import LoudSensor, loud_readings
 from syncline_design.diagnosis.motion_scatter import lasting
-from syncline_design.diagnosis.noise import SensorKey
+from syncline_design.diagnosis.noise import SensorKey, Structure
 from syncline_design.diagnosis.steady import goes_on
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
@@ -56,7 +56,7 @@ def factor_effect() -> Effect:
 def with_unlike(data: Data, found: tuple[Unlike, ...]) -> Data:
     """The data with white noise that differs among the readings of some sensors."""
     known = {one.sensor: one.growth for one in found}
-    slopes = slopes_of_readings(data)
+    slopes = grown_slopes(data)
     white = tuple(
         replace(part, unlike=known[part.sensor], slopes=slopes[part.sensor])
         if part.sensor in known
@@ -77,15 +77,29 @@ def slopes_of_readings(data: Data) -> dict[SensorKey, Array]:
     }
 
 
+def grown_slopes(data: Data) -> dict[SensorKey, Array]:
+    """The same of readings as the data have them, of which some rows may be far out."""
+    usual = slopes_of_readings(data)
+    return {
+        part.sensor: usual[part.sensor] if part.slopes is None else part.slopes
+        for part in data.structure.white
+    }
+
+
+def known_scatter(structure: Structure) -> Array:
+    """Covariance of every row (n, 3, 3) [m2] of what no sensor's noise makes."""
+    if structure.stamped is None:
+        return structure.fixed
+    return structure.fixed + structure.stamped @ np.swapaxes(structure.stamped, 1, 2)
+
+
 def unlike_readings(data: Data, model: Model) -> tuple[Unlike, ...]:
     """Sensors of which some readings are clearly louder than the spec and than the others."""
     if len(data.view) < LEAST_ROWS:
         return ()
-    axes, slopes = list(data.axes), slopes_of_readings(data)
+    axes, slopes = list(data.axes), grown_slopes(data)
     left = (model.error - lasting(data, model))[:, axes]
-    fixed = data.structure.fixed
-    if data.structure.stamped is not None:
-        fixed = fixed + data.structure.stamped @ np.swapaxes(data.structure.stamped, 1, 2)
+    fixed = known_scatter(data.structure)
     on_axes = {sensor: own[:, axes] for sensor, own in slopes.items()}
     motions = [one.direction[:, axes] for one in data.structure.directed]
     loud = loud_readings(left, on_axes, fixed[:, axes][:, :, axes], motions)

@@ -1,4 +1,4 @@
-"""Some positions are far off: Student's t instead of normal noise, or outliers."""
+"""Some positions or ranges are far off: Student's t instead of normal noise, or outliers."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ from syncline_design.model.system import Stage
 def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Departures:
     """Noise times sqrt(nu / chi2_nu) per row; a share of the rows are outliers instead.
 
+    Of a ranging sensor it is the range's: echoes of something else, edges, rain; bearings have
+    none of it.
+
     An outlier is normal with ten times the spec's standard deviation: Student's tails and outliers
     are two parts of a mixture, no row is struck by both.
     """
@@ -32,15 +35,19 @@ def _depart(rows: StageRows, values: Values, sensor: ActsOn, rng: Rng) -> Depart
     freedom = values["degrees_of_freedom"]
     factor = np.sqrt(freedom / rng.chisquare(freedom, len(rows)))
     struck = rng.random(len(rows)) < values["outlier_rate"]
-    return Departures(position_noise=np.where(struck, OUTLIER_FACTOR, factor) - 1.0)
+    extra = np.where(struck, OUTLIER_FACTOR, factor) - 1.0
+    if sensor == "position":
+        return Departures(position_noise=extra)
+    return Departures(range_noise=extra)
 
 
 def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> Contribution:
-    """What the standard deviation of the mixture grows by, times sigma_p.
+    """What the standard deviation of the mixture grows by, times sigma_p or the range's sigma.
 
     Var = (1 - rate) nu / (nu - 2) + rate 100, over the spec's variance; infinite up to nu = 2.
     """
-    if stage.position is None:
+    part = stage.position if sensor == "position" else stage.ranging
+    if part is None:
         return Contribution()
     if _unbudgeted(values):
         return Contribution(systematic_m=math.inf)
@@ -48,7 +55,8 @@ def _contribute(stage: Stage, values: Values, sensor: ActsOn, basis: Basis) -> C
     tails = (1.0 - rate) * freedom / (freedom - 2.0) if rate < 1.0 else 0.0
     variance = tails + rate * OUTLIER_FACTOR**2
     growth = math.sqrt(variance) - 1.0
-    return Contribution(systematic_m=growth * math.hypot(*stage.position.sigma))
+    sigma_m = math.hypot(*part.sigma) if sensor == "position" else part.sigma[0]
+    return Contribution(systematic_m=growth * sigma_m)
 
 
 def _unbudgeted(values: Values) -> str:
@@ -64,13 +72,13 @@ def _unbudgeted(values: Values) -> str:
 
 EFFECT = Effect(
     name="heavy_tails",
-    sensors=("position",),
+    sensors=("position", "ranging"),
     kind="stochastic",
     parameters=(
         Parameter("degrees_of_freedom", 1.0, 30.0, signed=False, above=0.0),
         Parameter("outlier_rate", 0.0, 0.3, signed=False, most=1.0),
     ),
-    sentence="positions have heavy tails: {degrees_of_freedom} degrees of freedom, a share of "
+    sentence="{sensor} data have heavy tails: {degrees_of_freedom} degrees of freedom, a share of "
     "{outlier_rate} outliers",
     confused_with="timestamp_jitter, noise_understated",
     separated_by="speed: tails are not linked to it",

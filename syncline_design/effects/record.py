@@ -87,7 +87,7 @@ class Departures:
     azimuth_rad, elevation_rad (n,): added to the measured bearing.
     target_m (n, 3): surveyed object minus true object, NED.
     position_noise, attitude_noise, ranging_noise (n,): the noise draw of that sensor is taken
-    times (1 + this).
+    times (1 + this); range_noise (n,): the range's times so much more, beside ranging_noise.
     """
 
     position_shift_s: Array = field(default_factory=lambda: _ZERO)
@@ -107,6 +107,7 @@ class Departures:
     position_noise: Array = field(default_factory=lambda: _ZERO)
     attitude_noise: Array = field(default_factory=lambda: _ZERO)
     ranging_noise: Array = field(default_factory=lambda: _ZERO)
+    range_noise: Array = field(default_factory=lambda: _ZERO)
 
     def __add__(self, other: Departures) -> Departures:
         """Both departures at once; rotation vectors add, which is exact to second order."""

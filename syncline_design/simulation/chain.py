@@ -239,7 +239,8 @@ def noise_slopes(
     slopes[:, :, 3:6] = _euler_slopes(r_hat, lever) * np.asarray(sigma.attitude_rad)
     slopes[:, :, 3:6] *= _column(1 + departures.attitude_noise)
     slopes[:, :, 6:] = r_hat @ _polar_slopes(rows, noise, departures) * np.asarray(sigma.ranging)
-    slopes[:, :, 6:] *= _column(1 + departures.ranging_noise)
+    slopes[:, :, 6:7] *= _column(1 + departures.ranging_noise + departures.range_noise)
+    slopes[:, :, 7:] *= _column(1 + departures.ranging_noise)
     return slopes
 
 
@@ -300,7 +301,9 @@ def _measured_polar(
         elevation = -np.arcsin(np.clip(turned[:, 2], -1.0, 1.0))
     scatter = 1 + departures.ranging_noise
     distance = (
-        rows.range_m * (1 + departures.range_scale) + departures.range_m + noise.range_m * scatter
+        rows.range_m * (1 + departures.range_scale)
+        + departures.range_m
+        + noise.range_m * (scatter + departures.range_noise)
     )
     return (
         distance,
