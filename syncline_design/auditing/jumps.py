@@ -61,6 +61,7 @@ _LEAST_EQUAL: Final = 4  # by one size
 _BEAT: Final = 0.1  # of the time between them
 _PARTS: Final = (1, 2, 3)  # of the least time between jumps
 _EQUAL: Final = 0.02
+_WHOLE: Final = 0.25  # of an interval: how near a jump by whole ones is to the level's
 _SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
 
 
@@ -259,6 +260,8 @@ def _sizes(
             continue
         apart_s = abs(size - round(size / pace.period_s) * pace.period_s)
         whole = apart_s <= max(_JITTER * pace.jitter_s, _LEAST_S)
+        if whole and abs(size + moved) > _WHOLE * pace.period_s + 2.0 * sure:
+            continue  # receipts moved by another size than stamps can have jumped by
         if whole and count > round(interval / pace.period_s) >= 1:
             continue  # receipts jumped where messages are lost: stamps keep their rhythm
         chance = whole and abs(size) < _CHANCE * width

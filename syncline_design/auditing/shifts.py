@@ -26,6 +26,7 @@ from syncline_design.auditing.plain_step import without_plain_step
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds
 from syncline_design.auditing.settling import settled
+from syncline_design.auditing.whole_holes import breaks_none, passed
 from syncline_design.auditing.witness import Side
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -34,6 +35,7 @@ _BEAT: Final = 1.2  # ticks
 _REST: Final = 0.025  # of a jump: how well its size is known at once
 _OTHER_RATE: Final = 0.3  # of an interval
 _CHANCE: Final = 4.0  # sigma of a mean interval, of sensors without a rhythm
+_HOLE: Final = 4.0  # intervals: of so long a one it is not known what jumped within it
 _LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
 
 
@@ -134,7 +136,8 @@ def _slow_shifts(
         for s in shapes_of(blocks, least_s=least_s, settling_s=settling_s)
     ]
     seen = tuple(placed)
-    judged = [_judged(pace, shape, time_s, blocks) for shape in placed]
+    by = passed(series, pace) if placed else pace.steps
+    judged = [_judged((pace, by), shape, time_s, blocks) for shape in placed]
     tick = longest_tick(series) if placed else 0.0
     hidden = any(_with_what_it_stamps(shape, time_s, late, tick) for shape, _ in judged)
     judged = [(s, side) for s, side in judged if not hidden or abs(s.size_s) > tick]
@@ -248,16 +251,20 @@ def _change(at_s: float, size_s: float, time_s: Array, late: Array, blocks: Bloc
     return float(time_s[a + split])
 
 
-def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple[Shape, Side]:
-    """A shape put where the stamps' own rhythm breaks, and whether it breaks there at all."""
+def _judged(
+    told: tuple[Cadence, Array], shape: Shape, time_s: Array, blocks: Blocks
+) -> tuple[Shape, Side]:
+    """A shape put where the stamps' own rhythm breaks, and whether it breaks there at all; told: a
+    rhythm, and how many of its intervals passed between messages."""
+    pace = told[0]
     if shape.kind in ("drift", "bend", "ramp", "holdover") or not pace.regular:
         return shape, "unknown"
-    side, at = _broken(pace, shape.begin_s, -shape.size_s, time_s, blocks, shape.settle_s)
+    side, at = _broken(told, shape.begin_s, -shape.size_s, time_s, blocks, shape.settle_s)
     if at is not None:
         end = at if shape.kind == "relock" else shape.end_s
         shape = replace(shape, begin_s=at, end_s=end)
     if shape.kind == "episode":
-        other, at = _broken(pace, shape.end_s, shape.size_s, time_s, blocks)
+        other, at = _broken(told, shape.end_s, shape.size_s, time_s, blocks)
         early = shape.begin_s < float(time_s[0]) + 0.05 * float(time_s[-1] - time_s[0])
         if other == "stamp" and side != "stamp" and early:  # only the other edge is a jump
             begin = shape.end_s if at is None else at
@@ -271,7 +278,7 @@ def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple
 
 
 def _broken(
-    pace: Cadence,
+    told: tuple[Cadence, Array],
     at_s: float,
     jump_s: float,
     time_s: Array,
@@ -283,13 +290,14 @@ def _broken(
     The interval that does is the jump longer; where the rhythm scatters too much for one interval,
     the sum of all near by.  What settles was larger, had it begun earlier than it was put.
     """
+    pace, by = told
     width = _LOOK * blocks.length_s
     inside = np.flatnonzero((time_s[1:] > at_s - width) & (time_s[:-1] < at_s + width))
     if not inside.size:
         return "unknown", None
     period, noise = pace.period_s, 6.0 * pace.jitter_s + 1e-9
     large = abs(jump_s) > 0.4 * period
-    steps = 1.0 if large else pace.steps[inside]
+    steps = by[inside] if large else pace.steps[inside]
     off = pace.interval[inside] - steps * period
     sizes = np.full(inside.size, jump_s)
     if settle_s > 0.0:
@@ -299,8 +307,9 @@ def _broken(
     if abs(sizes[nearest]) > noise and apart[nearest] < 0.35:
         return "stamp", float(time_s[inside[nearest] + 1])
     if large:
-        hole = bool(np.any(pace.interval[inside] > 4.0 * period))
-        return ("unknown" if hole else "receipt"), None
+        holes = inside[pace.interval[inside] > _HOLE * period]
+        keeps = breaks_none(pace, holes, jump_s, blocks.spread_s)
+        return ("unknown" if holes.size and not keeps else "receipt"), None
     moved = float(off.sum())
     bound = max(0.35 * abs(jump_s), noise)
     if noise < abs(jump_s) and abs(moved - jump_s) < bound:

@@ -19,6 +19,7 @@ from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.series import Array, Series, median, scatter, seconds
+from syncline_design.auditing.whole_holes import counted
 from syncline_design.machine.quick_dataclass import dataclass
 
 Side = Literal["stamp", "receipt", "unknown"]
@@ -36,7 +37,6 @@ _MANY: Final = 3  # shapes of one clock: more likely one course
 _SAME: Final = 0.3
 _LEAST_SHARE: Final = 0.25  # of the delays' spread
 _LEAST_RUN_S: Final = 2e-5
-_MOST_ODD: Final = 5000
 _PARTS: Final = 12  # of a log, to see whether it runs along a line
 _SHARP: Final = 0.6  # of a step: seen between the messages just before and after
 _BESIDE: Final = 12  # messages on each side
@@ -58,7 +58,7 @@ def witness_of(series: Series, pace: Cadence, blocks: Blocks) -> Witness | None:
     off = np.abs(pace.interval - pace.steps * pace.period_s)
     if float(np.percentile(off, 90.0)) > _COUNTED * pace.period_s:
         return None
-    count = np.concatenate([[0.0], np.cumsum(_counted(series, pace))])
+    count = np.concatenate([[0.0], np.cumsum(counted(series, pace))])
     when = seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
     apart = when - pace.period_s * count
     level = np.asarray([median(apart[a:b]) for a, b in _pairs(blocks.edges)])
@@ -67,23 +67,6 @@ def witness_of(series: Series, pace: Cadence, blocks: Blocks) -> Witness | None:
         return None
     around = np.diff(level)
     return Witness(blocks.time_s[use], level[use], scatter(around) / float(np.sqrt(2.0)))
-
-
-def _counted(series: Series, pace: Cadence) -> Array:
-    """Messages from each to the next: as stamps say, where these jumped as receipts do."""
-    assert series.receive is not None
-    passed = seconds(np.diff(series.receive[pace.places]))
-    late = seconds((series.receive - series.stamp)[pace.places])
-    steps = np.maximum(pace.steps, 1.0)
-    by_receipt = np.maximum(np.round(passed / pace.period_s), 1.0)
-    odd = np.flatnonzero((steps != by_receipt) & (pace.steps != 1.0))
-    for k in odd[:_MOST_ODD]:
-        before, after = late[max(0, k - 7) : k + 1], late[k + 1 : k + 9]
-        moved = float(np.median(before) - np.median(after))
-        jump = float(pace.interval[k] - by_receipt[k] * pace.period_s)
-        if abs(moved - jump) < 0.5 * pace.period_s:
-            steps[k] = by_receipt[k]
-    return steps
 
 
 def _pairs(edges: np.ndarray) -> list[tuple[int, int]]:
