@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import cast
 from xml.etree import ElementTree
 
 import pytest
@@ -14,11 +15,16 @@ from html_page import Page
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.report.ci import notices
+from syncline_design.report.csv_out import render_csv
+from syncline_design.report.junit import render_junit
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
+from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
-from syncline_design.report.several import summary_line
+from syncline_design.report.several import since_line, summary_line
+from syncline_design.report.verdict_words import since_sentence
 from syncline_design.verdict.baseline import against
+from syncline_design.verdict.since import Baseline
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings
 from tests.checked import check_file
@@ -27,6 +33,8 @@ ROOT = Path(__file__).parent.parent
 FAILING = (ROOT / "specs" / "usv_wire_missing.yaml").read_text(encoding="utf-8")
 # 447.4 mm of 250 mm, tau / tau_crit 1.734 of 1, 33 357.35 EUR of 36 000 EUR
 ACCURACY, COST = "limit: 0.25 m", "limit: 36000 EUR"
+KIND = "kind: accuracy"
+WHOLE = f"{KIND}, {ACCURACY}"
 OPEN = (ROOT / "specs" / "infeasible_example.yaml").read_text(encoding="utf-8")
 SYNC = ("kind: sync, limit: 1.0", "kind: sync, limit: 0.000001")  # no stamps are so good
 PLAIN = CheckSettings(monte_carlo=False)
@@ -86,6 +94,24 @@ CASES = {
         1,
         {"M": "new"},
     ),
+    "another quantity under its name, missed": (
+        FAILING,
+        changed(FAILING, (KIND, "kind: worst_case")),
+        1,
+        {"ACC-1": "new"},
+    ),
+    "another axis under its name, missed": (
+        changed(FAILING, (WHOLE, "kind: rmse, axis: 3d, limit: 1 cm")),
+        changed(FAILING, (WHOLE, "kind: rmse, axis: vertical, limit: 1 cm")),
+        1,
+        {"ACC-1": "new"},
+    ),
+    "another quantity under its name, kept": (
+        FAILING,
+        changed(FAILING, (WHOLE, "kind: mass, limit: 9 kg")),
+        0,
+        {"ACC-1": "new"},
+    ),
     "new and kept": (
         FAILING,
         changed(
@@ -140,6 +166,29 @@ def test_only_what_got_worse_fails(
     failing = [n.level for n in notices(now) if n.level in ("fail", "undecided")]
     assert bool(failing) == (code != 0)
     assert read_as(Verdict, json.dumps(now.to_json())) == now
+
+
+def test_an_id_that_limits_something_else_says_so_and_is_no_case_of_a_known_miss(
+    tmp_path: Path,
+) -> None:
+    old = verdict_of(tmp_path, FAILING)
+    now = against(verdict_of(tmp_path, changed(FAILING, (KIND, "kind: worst_case"))), [old], "b")
+    assert "limited Syncline error then" in console(on_verdict(now))
+    assert '"ACC-1","worst_case","fail"' in render_csv([now])
+    assert '"new: limited Syncline error then","accuracy","fail"' in render_csv([now])
+    failed = ElementTree.fromstring(render_junit([now])).findall(".//testcase/failure")
+    assert any("new: in b it limited Syncline error" in one.get("message", "") for one in failed)
+
+
+def test_what_got_worse_and_is_waived_is_named(tmp_path: Path) -> None:
+    waiver = "waiver: {reason: trial, expires: 2999-12-31}"
+    old = verdict_of(tmp_path, changed(FAILING, (COST, f"limit: 30000 EUR, {waiver}")))
+    lower = verdict_of(tmp_path, changed(FAILING, (COST, f"limit: 20000 EUR, {waiver}")))
+    now = against(lower, [old], "b")
+    assert "nothing got worse but what is waived (COST-1): the exit" in since_sentence(
+        cast(Baseline, now.baseline), now
+    )
+    assert "nothing got worse but what is waived: the exit" in since_line([now])
 
 
 def test_simulated_figures_are_worse_only_where_their_intervals_do_not_meet(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from syncline_design.report.verdict_words import (
     kind_text,
     margin_text,
     outcome,
+    quantity_then,
     since_sentence,
     status_id,
     waiver_text,
@@ -141,6 +142,8 @@ def _no_worse(known: Baseline) -> str:
 def _then(known: Baseline, row: RequirementResult) -> str:
     """What a requirement was at in the baseline, where both are known."""
     was = next((one.was for one in known.requirements if one.id == row.id), None)
+    if was is not None and was.kind is not None:
+        return f"new: in {known.file} it limited {quantity_then(was)}"
     if was is None or was.value is None:
         return ""
     value, limit = numbers.held(was.value, was), numbers.limit(was)

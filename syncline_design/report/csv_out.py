@@ -14,8 +14,8 @@ from syncline_design.verdict.since import RequirementSince
 from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 _COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value", "limit", "unit",
-            "margin", "line", "warnings", "waiver", "since_baseline", "status_then", "value_then",
-            "limit_then", "unit_then")  # fmt: skip
+            "margin", "line", "warnings", "waiver", "since_baseline", "kind_then", "status_then",
+            "value_then", "limit_then", "unit_then")  # fmt: skip
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
@@ -112,6 +112,6 @@ def _then(verdict: Verdict, one: RequirementSince) -> dict[str, Any]:
     if one.was is not None:
         then = one.was
         status = "waived" if then.waived else then.status
-        found |= {"status_then": status, "value_then": then.value}
+        found |= {"kind_then": then.kind or "", "status_then": status, "value_then": then.value}
         found |= {"limit_then": then.limit, "unit_then": then.unit}
     return found

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import worse_but_waived
 from syncline_design.report.words import VERBS
 from syncline_design.spec.folders import Skipped
 from syncline_design.verdict.tree import Checked, Verdict
@@ -30,7 +31,9 @@ def since_line(verdicts: Sequence[Checked]) -> str:
     worse = [v.name for v in verdicts if isinstance(v, Verdict) and v.baseline and v.baseline.worse]
     lead = f"Against {visible(known[0].file)}"
     if not worse:
-        return f"{lead} nothing got worse: the exit code is 0."
+        waived = any(worse_but_waived(v) for v in verdicts if isinstance(v, Verdict))
+        but = " but what is waived" if waived else ""
+        return f"{lead} nothing got worse{but}: the exit code is 0."
     return f"{lead} {len(worse)} of {len(verdicts)} got worse: {visible(sentence_list(worse))}."
 
 

@@ -31,7 +31,7 @@ NAMED: Final = 6  # of those that fail, by name
 if TYPE_CHECKING:
     from syncline_design.verdict.named import NamedRole
     from syncline_design.verdict.optimization import Optimization
-    from syncline_design.verdict.since import Baseline, RequirementSince
+    from syncline_design.verdict.since import Baseline, Earlier, RequirementSince
     from syncline_design.verdict.syncline_figures import LedgerRow
     from syncline_design.verdict.tree import (
         Caution,
@@ -151,7 +151,14 @@ def since_word(one: RequirementSince, verdict: Verdict) -> Outcome:
         return replace(word, word="not judged")
     if one.change == "worse" and word is STATUSES["waived"]:
         return replace(since, tone=word.tone, word=f"{since.word}, {word.word}")
+    if one.was is not None and one.was.kind is not None:
+        return replace(since, word=f"{since.word}: limited {quantity_then(one.was)} then")
     return since
+
+
+def quantity_then(was: Earlier) -> str:
+    """What a requirement limited in the baseline; nothing where it is what it limits now."""
+    return "" if was.kind is None else kind_words(was.kind, was.quantile, was.axis)
 
 
 def waiver_text(row: RequirementResult) -> str:
@@ -173,11 +180,21 @@ def since_sentence(baseline: Baseline, verdict: Verdict) -> str:
     waived = [one.id for one in baseline.requirements if one.was and one.was.waived]
     then = with_waived(OUTCOMES[baseline.verdict], waived if baseline.verdict == "meets" else ())
     was = f"Then ({file}): {then.word}."
-    if verdict.verdict == "meets":
-        return was
     if baseline.worse:
         return f"{was} Since then it got worse."
-    return f"{was} Since then nothing got worse: the exit code is 0."
+    waived_now = worse_but_waived(verdict)
+    if verdict.verdict == "meets":
+        but = f" Since then {sentence_list(waived_now)} got worse, waived." if waived_now else ""
+        return was + but
+    but = f" but what is waived ({sentence_list(waived_now)})" if waived_now else ""
+    return f"{was} Since then nothing got worse{but}: the exit code is 0."
+
+
+def worse_but_waived(verdict: Verdict) -> list[str]:
+    """Ids of what got worse since the baseline and does not count, by a waiver in force."""
+    since = verdict.baseline.requirements if verdict.baseline else ()
+    worse, waived = {one.id for one in since if one.change == "worse"}, verdict.requirements
+    return [visible(one) for one in waived_misses(waived) if one in worse]
 
 
 def kind_text(row: RequirementResult) -> str:

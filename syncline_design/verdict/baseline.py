@@ -2,8 +2,8 @@
 
 Worse is: a requirement passed and no longer does, or was open and fails; it fails by more (value
 over limit, of a simulated one where the two intervals do not meet; of two verdicts without a
-design, by a lower limit); it is new and does not pass; or the verdict as a whole fell from `meets`
-to `indeterminate`, `fails`, `infeasible`.
+design, by a lower limit); it is new, or limits another quantity than it did, and does not pass; or
+the verdict as a whole fell from `meets` to `indeterminate`, `fails`, `infeasible`.
 """
 
 from __future__ import annotations
@@ -51,6 +51,11 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
     old = {row.id: row for row in before.requirements}
     for row in verdict.requirements:
         was = old.pop(row.id, None)
+        if was is not None and _quantity(row) != _quantity(was):
+            kind, quantile, axis = _quantity(was)
+            then = replace(_earlier(was), kind=kind, quantile=quantile, axis=axis)
+            yield RequirementSince(row.id, "new", then)
+            continue
         if was is None and _is_implied(row) and before.design is None:
             change: SinceBaseline = _without_design(verdict, before, row, row)
         elif was is None:
@@ -63,6 +68,12 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
     for was in old.values():
         if verdict.design is not None or not _is_implied(was):
             yield RequirementSince(was.id, "gone", _earlier(was))
+
+
+def _quantity(row: RequirementResult) -> tuple[str, float | None, str | None]:
+    """What a requirement limits; figures of different quantities do not compare."""
+    axis = row.axis or "3d" if row.kind in ("rmse", "quantile") else row.axis
+    return row.kind, row.quantile, axis
 
 
 def _is_implied(row: RequirementResult) -> bool:

@@ -12,7 +12,10 @@ SinceBaseline = Literal["worse", "better", "same", "new", "gone"]
 
 @dataclass(frozen=True, slots=True)
 class Earlier(Record):
-    """How a requirement stood in the baseline; waived: missed under a waiver then in force."""
+    """How a requirement stood in the baseline; waived: missed under a waiver then in force.
+
+    kind, quantile, axis: what it limited then, where that is not what it limits now.
+    """
 
     status: Literal["pass", "fail", "indeterminate"]
     value: float | None
@@ -20,11 +23,14 @@ class Earlier(Record):
     unit: str
     limit_written: str | None = optional()
     waived: bool | None = optional()
+    kind: str | None = optional()
+    quantile: float | None = optional()
+    axis: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
 class RequirementSince(Record):
-    """What became of a requirement; was: None of a new one."""
+    """What became of a requirement; was: None of a new one, unless its id was another's before."""
 
     id: str
     change: SinceBaseline
