@@ -260,7 +260,7 @@ LAST = {
 
 
 @pytest.mark.parametrize("kind", LAST)
-@pytest.mark.parametrize("rows", [150, 900])
+@pytest.mark.parametrize("rows", [30, 150, 900])
 def test_a_last_row_that_is_cut_within_its_last_figure_is_left_out(
     tmp_path: Path, kind: str, rows: int
 ) -> None:
@@ -288,6 +288,8 @@ def test_a_last_row_of_fewer_digits_is_whole_where_figures_vary(tmp_path: Path) 
         [*rng.integers(10, 14, 2000).tolist(), 9],
         [*rng.integers(100000, 999999, 2000).tolist(), 3],
         [*range(10, 90), 9],
+        [*(round(float(v), 3) for v in rng.uniform(0.0, 9.0, 30)), 4.5],
+        [*rng.integers(1000, 4000, 40).tolist(), 3],
     ):
         path = tmp_path / "x.csv"
         rows = [f"{k}.25,{one}" for k, one in enumerate(figures)]

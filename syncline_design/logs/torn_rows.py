@@ -16,6 +16,9 @@ from syncline_design.logs.delimited import Dialect, split_line
 
 _TAIL_BYTES: Final = 1 << 16
 _LEAST: Final = 100  # rows above, of which a whole figure hardly has the fewest digits by chance
+_ALIKE: Final = 24  # all of one length: of figures without their last zeros some are shorter
+_WHOLE: Final = 8  # rows, where the whole part of a figure falls by far more than it ever moved
+_FAR: Final = 8.0  # times as far
 _FIGURE: Final = re.compile(r"[+-]?(\d+)(?:[.,](\d*))?")
 _POWER: Final = re.compile(r"[+-]?\d+(?:[.,]\d*)?[eE][+-]?\d+")
 _DATE: Final = re.compile(ISO)
@@ -42,25 +45,29 @@ def _last_cells(path: Path, how: Dialect, end: int) -> list[str]:
 
 
 def _lacks_digits(cell: str, above: Sequence[str]) -> bool:
-    """Whether a cell is shorter than every one of many above it, as none of its kind is."""
-    if len(above) < _LEAST:
-        return False
+    """Whether a cell is shorter than every one above it, of as many as none of its kind is."""
+    alike = len(above) >= _ALIKE
     for kind in (_DATE, _POWER):
         if all(kind.fullmatch(other) for other in above):  # of one length, where all are written so
-            return len({len(other) for other in above}) == 1 and len(cell) < len(above[0])
+            one_length = alike and len({len(other) for other in above}) == 1
+            return one_length and len(cell) < len(above[0])
     found, others = _FIGURE.fullmatch(cell), [_FIGURE.fullmatch(other) for other in above]
     if found is None or not all(others):
         return False
-    decimals = min(len(one[2] or "") for one in others if one)
-    if decimals:
-        return len(found[2] or "") < decimals
-    whole = [int(one[1]) for one in others if one and one[2] is None]
-    return len(whole) == len(above) and found[2] is None and _fell_short(int(found[1]), whole)
+    wholes = [int(one[1]) for one in others if one]
+    if found[2] is None and _fell_short(int(found[1]), wholes):
+        return True
+    lengths = {len(one[2] or "") for one in others if one}
+    told = len(above) >= _LEAST or (alike and len(lengths) == 1)
+    return told and len(found[2] or "") < min(lengths, default=0)
 
 
 def _fell_short(figure: int, above: Sequence[int]) -> bool:
     """Whether a whole number is far from the one above, and with the digits that it has fewer is
     as near to it as these are to one another."""
+    far = len(above) >= _WHOLE and above[-1] - figure > _FAR * (max(above) - min(above))
+    if len(above) < _LEAST and not far:
+        return False
     missing = min(len(str(one)) for one in above) - len(str(figure))
     step = max(abs(b - a) for a, b in pairwise(above))
     if missing < 1 or abs(figure - above[-1]) <= step:
