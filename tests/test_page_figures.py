@@ -16,10 +16,11 @@ from diagnosis_samples import CLOSED, diagnosis
 from html_page import Page
 from syncline_design.model.written import beside
 from syncline_design.report import numbers
-from syncline_design.report.axes import log_ticks
+from syncline_design.report.axes import in_view, log_ticks
 from syncline_design.report.charts import WIDTH, LedgerBar, SynclineCurve, ledger, syncline
 from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
 from syncline_design.report.charts_distribution import DensityBars, error_histogram
+from syncline_design.report.charts_front import FrontMark, pareto_front
 from syncline_design.report.charts_ways import from_above
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_diagnosis import on_diagnosis
@@ -314,3 +315,21 @@ def test_the_axis_of_a_map_keeps_its_title_in_the_frame() -> None:
     drawn = draw("fig-map", "Map", "a map", (WIDTH, 340.0), build).svg
     (foot,) = re.findall(r'x="(-?[\d.]+)" y="[\d.]+" transform="rotate\(-90', drawn)
     assert float(foot) > 9.0  # letters of 10 px stand on it, to the left
+
+
+def test_designs_that_no_word_tells_apart_are_told_once_and_counted() -> None:
+    front = [FrontMark(100.0, 1.0, True, "A (gpio)"), FrontMark(200.0, 0.5, False, "B (gpio)")]
+    same = [FrontMark(150.0, 0.8, False, "C (arrival)")] * 3
+    other = FrontMark(150.0, 0.9, False, "C (arrival)")
+    drawn = pareto_front(front, "EUR", None, None, cloud=[front[0], *same, other])
+    said = [dict(tip.says) for tip in drawn.told]
+    assert [(one["Design"], one.get("Alike", "")) for one in said] == [
+        ("A (gpio)", ""), ("B (gpio)", ""),
+        ("C (arrival)", "3, which differ in signal or clock"), ("C (arrival)", ""),
+    ]  # fmt: skip
+
+
+def test_a_front_stands_before_all_designs_but_those_that_leave_it_no_room() -> None:
+    seen = [FrontMark(30.0, 29.0, False), FrontMark(500.0, 0.1, False)]
+    unseen = [FrontMark(600.0, 1.0, False), FrontMark(100.0, 31.0, False)]
+    assert in_view([*seen, *unseen], [100.0, 200.0], 1.0, None) == seen

@@ -12,7 +12,8 @@ from syncline_design.report.palette import GRID, MUTED
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FAR = 8.0  # times the largest error of a front: beyond it no other design is drawn
+FAR = 30.0  # times the largest error of a front: beyond it no other design is drawn
+DEAR = 2.5  # times the end of the front's axis of prices: the same
 LETTER, GAP = 5.8, 7.0  # width of a letter of a label, and between two labels [SVG units]
 _SUPERSCRIPT = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
@@ -31,22 +32,25 @@ class Priced(Protocol):
 P = TypeVar("P", bound=Priced)
 
 
-def price_axis(costs: Sequence[float], limit: float | None) -> tuple[float, float]:
-    """Ends of an axis of prices that shows those of a front, and their limit where there is one."""
+def price_axis(
+    costs: Sequence[float], limit: float | None, others: Sequence[float] = ()
+) -> tuple[float, float]:
+    """Ends of an axis of prices that shows those of a front, and their limit where there is one.
+
+    others: prices of further designs, which it shows too.
+    """
     span = max(costs) - min(costs) or max(costs) or 1.0
-    right = max([max(costs) + 0.15 * span, *([1.04 * limit] if limit else [])])
-    return max(0.0, min(costs) - 0.12 * span), right
+    right = max([max(costs) + 0.15 * span, *([1.04 * limit] if limit else []),
+                 1.03 * max(others, default=0.0)])  # fmt: skip
+    left, least = min(costs) - 0.12 * span, min(others, default=right)
+    return max(0.0, min(left, least - 0.04 * (right - least))), right
 
 
 def in_view(designs: Iterable[P], costs: Sequence[float], worst_m: float,
             limit: float | None) -> list[P]:  # fmt: skip
-    """Designs near enough to a front to be drawn with it, in error and in price.
-
-    costs, worst_m: of the front; cheaper ones count for another width of its axis.
-    """
-    left, right = price_axis(costs, limit)
-    least = left - (right - left)
-    return [p for p in designs if least <= p.cost <= right and 0.0 < p.error_m <= FAR * worst_m]
+    """Designs that can be drawn with a front and leave it room; costs, worst_m: of the front."""
+    most = DEAR * price_axis(costs, limit)[1]
+    return [p for p in designs if p.cost <= most and 0.0 < p.error_m <= FAR * worst_m]
 
 
 def power_of_ten(value: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -51,13 +52,12 @@ def pareto_front(
         axes = add_axes(figure)
         costs = [p.cost for p in points]
         near = cost_limit if cost_limit and cost_limit <= LAX * max(costs, default=0.0) else None
-        _staircase(axes, points, near)
-        for point in points:
-            tell(axes, point.cost, point.error_m, _says(point, currency, limit))
-        errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
         around = scales.in_view(cloud, costs, max(p.error_m for p in points), near)
+        _staircase(axes, points, scales.price_axis(costs, near, [p.cost for p in around]))
+        errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
         errors += [p.error_m for p in around]
-        _cloud(axes, around, currency, limit)
+        _cloud(axes, around)
+        _tell_each(axes, points, around, currency, limit)
         if beside is not None:
             errors.append(beside[1])
             _named_mark(axes, *beside, "nearest", WARN)
@@ -76,20 +76,28 @@ def pareto_front(
     return draw(name, title, _front_words(points, currency, limit, beside), (WIDTH, 290.0), build)
 
 
-def _cloud(
-    axes: Axes, shown: Sequence[FrontMark], currency: str, limit: numbers.Limited | None
-) -> None:
+def _cloud(axes: Axes, shown: Sequence[FrontMark]) -> None:
     """Other designs: a quiet dot each, a cross for those that break another requirement."""
-    left, right = axes.get_xlim()
-    cheapest = min((p.cost for p in shown), default=right)
-    axes.set_xlim(max(0.0, min(left, cheapest - 0.04 * (right - cheapest))), right)
     for marker, size, breaks in (("o", 3.0, False), ("x", 3.0, True)):
         some = [p for p in shown if p.breaks is breaks]
         axes.plot([p.cost for p in some], [p.error_m for p in some], marker, color=MUTED,
                   alpha=0.45, markersize=size, markeredgewidth=0.7 if breaks else 0,
                   linestyle="none", zorder=1)  # fmt: skip
-    for point in shown:
-        tell(axes, point.cost, point.error_m, _says(point, currency, limit))
+
+
+def _tell_each(
+    axes: Axes, points: Sequence[FrontMark], around: Sequence[FrontMark], currency: str,
+    limit: numbers.Limited | None,
+) -> None:  # fmt: skip
+    """What stands at every mark; designs that these words do not tell apart are told once."""
+    alike = Counter(tuple(_says(one, currency, limit)) for one in around)
+    placed: dict[tuple[tuple[str, str], ...], FrontMark] = {}
+    for one in (*points, *around):
+        placed.setdefault(tuple(_says(one, currency, limit)), one)
+    for says, one in placed.items():
+        count = alike[says]
+        more = [("Alike", f"{count}, which differ in signal or clock")] if count > 1 else []
+        tell(axes, one.cost, one.error_m, [*says, *more])
 
 
 def _says(point: FrontMark, currency: str, limit: numbers.Limited | None) -> list[tuple[str, str]]:
@@ -98,10 +106,10 @@ def _says(point: FrontMark, currency: str, limit: numbers.Limited | None) -> lis
             ("Error", numbers.error(point.error_m, limit))]  # fmt: skip
 
 
-def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None) -> None:
+def _staircase(axes: Axes, points: Sequence[FrontMark], ends: tuple[float, float]) -> None:
     costs = [p.cost for p in points]
     errors = [p.error_m for p in points]
-    left, right = scales.price_axis(costs, cost_limit)
+    left, right = ends
     axes.set_yscale("log")
     axes.step([*costs, right], [*errors, errors[-1]], where="post", color=LINE, linewidth=2)
     axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)

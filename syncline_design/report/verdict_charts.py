@@ -201,7 +201,8 @@ def _cloud_words(
     if not shown:
         return ""
     every = combinations is not None and str(len(cloud)) == combinations
-    which = "all designs" if every else f"{len(cloud)} designs drawn at random"
+    number = numbers.count(len(cloud))
+    which = f"all {number} designs" if every else f"{number} designs drawn at random"
     broken = any(one.breaks for one in shown)
     crosses = "; a cross breaks a requirement other than accuracy" if broken else ""
     dearest = max(one.cost for one in shown) or 1.0
@@ -209,7 +210,9 @@ def _cloud_words(
         (round(200.0 * one.cost / dearest), round(200.0 * math.log(one.error_m))) for one in shown
     })  # fmt: skip
     drawn = f", at {places} places" if 2 * places < len(shown) else ""
-    return f" Dots: of {which}, the {len(shown)} that lie near the front{drawn}{crosses}."
+    far = len(cloud) - len(shown)
+    left_out = f", but for {far} far dearer or less accurate" if far else ""
+    return f" Dots: {which}{left_out}{drawn}{crosses}."
 
 
 def choice_chart(verdict: Verdict) -> list[Node]:
