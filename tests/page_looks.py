@@ -32,6 +32,11 @@ FLAWS = """(width) => {
       if (word.getClientRects().length > 1) flaws.push('broken: ' + word.innerText);
     });
   });
+  document.querySelectorAll('thead button').forEach(button => {
+    const unseen = getComputedStyle(button.closest('thead')).position === 'absolute';
+    if (seen(button) && unseen && button.tabIndex >= 0)
+      flaws.push('a stop of the Tab key that nobody sees: ' + button.innerText);
+  });
   document.querySelectorAll('h3').forEach(head => {
     const next = head.nextElementSibling;
     if (seen(head) && !(next && (next.innerText.trim() || next.querySelector('svg'))))

@@ -65,6 +65,8 @@
     turn(frame, "tight");
     if (tablet.matches) { turn(frame, "wide"); }
     turn(frame, "broken");
+    var head = frame.querySelector("thead"), unseen = head && getComputedStyle(head).position === "absolute";
+    frame.querySelectorAll("thead button").forEach(function (button) { button.tabIndex = unseen ? -1 : 0; });
     frame.classList.toggle("more", cut(frame));
     frame.classList.toggle("down", frame.matches(".inner, .long") && frame.scrollHeight > frame.clientHeight + 1);
   }

@@ -278,13 +278,26 @@ def _simulation(verdict: Verdict) -> list[Node]:
     monte_carlo = verdict.monte_carlo
     if monte_carlo is None:
         return []
-    told = (certificate(monte_carlo), ensemble(monte_carlo), BEYOND)
+    told = (certificate(monte_carlo), _own_reach(verdict), ensemble(monte_carlo), BEYOND)
     return [
         Facts(tuple(simulation_facts(monte_carlo))),
-        *(Text(text, quiet=True) for text in told),
+        *(Text(text, quiet=True) for text in told if text),
         *along_chart(monte_carlo),
         *show(quantiles(monte_carlo)),
     ]
+
+
+def _own_reach(verdict: Verdict) -> str:
+    """Why the certified worst case may be smaller than the worst case that was found."""
+    figures, found = verdict.figures, verdict.monte_carlo
+    certified = None if figures is None else figures.worst_case_1sigma_m
+    if certified is None or found is None or certified >= found.worst_case.value_m:
+        return ""
+    limit = verdict_charts.tightest_limit(verdict, "accuracy")
+    return (
+        "Here any two stamps differ by as much as the Syncline allows; the certified worst case "
+        f"({numbers.error(certified, limit)}) lets each pair differ by what its own timestamps can."
+    )
 
 
 def _choice(verdict: Verdict) -> list[Node]:

@@ -18,6 +18,7 @@ from syncline_design.verdict.acceptance import (
     refuse_trajectory,
     simulation_settings,
 )
+from syncline_design.verdict.agreed_figures import agreed
 from syncline_design.verdict.bill import bill_of_materials
 from syncline_design.verdict.cautions import cautions
 from syncline_design.verdict.cautions_of_facts import lifecycle_cautions
@@ -35,7 +36,7 @@ from syncline_design.verdict.measured import claim_cautions, measured
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.recheck import recheck
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import Caution, Verdict
+from syncline_design.verdict.tree import Caution, Verdict, word_of
 from syncline_design.verdict.verified import (
     Verified,
     error_figures,
@@ -117,7 +118,9 @@ def verdict_on(
         return decided
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
-    figures = error_figures(verified, settings.seed, settings.monte_carlo)
+    rows, figures = agreed(
+        case, verified.requirements, error_figures(verified, settings.seed, settings.monte_carlo)
+    )
     told = sources(entries)
     bill = bill_of_materials(case, problem, verified.design)
     assert decided.design is not None
@@ -130,6 +133,8 @@ def verdict_on(
     simulated = _pictured(case, verified, settings, pieces)
     return replace(
         decided,
+        verdict=word_of(rows),
+        requirements=rows,
         monte_carlo=simulated,
         warnings=(
             *cautions(case, verified, figures, assumed, transcripts(entries)),
