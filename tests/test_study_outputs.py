@@ -7,6 +7,7 @@ import html
 import io
 import json
 import re
+import time
 from datetime import date
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,7 +20,7 @@ from report_samples import HOSTILE
 from study_specs import SPEC, STUDY, write
 from syncline_design.machine.records import read_as, schema_of
 from syncline_design.report.on_study import on_study
-from syncline_design.report.progress_line import ProgressLine, progress_text
+from syncline_design.report.progress_line import ProgressLine, StepLine, busy, progress_text
 from syncline_design.report.render_console import console, table_lines
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.report.studies import STUDY_FORMATS, render_study
@@ -228,3 +229,26 @@ def test_progress_in_a_log_is_written_now_and_then() -> None:
 def test_console_tables_line_up() -> None:
     shown = table_lines(table("T", ("a", "b #"), [("x", "1"), ("long", "22")]))
     assert list(shown) == ["T", "  a      b", "  x      1", "  long  22"]
+
+
+def test_what_takes_long_says_what_it_does_in_a_log_too() -> None:
+    """Once in ten seconds there; within a second nothing is said, and nothing where it is quiet."""
+    log, silent = io.StringIO(), io.StringIO()
+    line, quiet = StepLine(log), StepLine(silent, quiet=True)
+    for elapsed_s in (0.5, 5.0, 10.5, 12.0, 21.0):
+        line("choosing", elapsed_s)
+        quiet("choosing", elapsed_s)
+    line.clear()
+    assert log.getvalue() == "choosing (10 s)\nchoosing (21 s)\n"
+    assert silent.getvalue() == ""
+
+
+def test_drawing_says_so_where_it_takes_longer_than_a_second(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("syncline_design.report.progress_line.SILENT_S", 0.01)
+    monkeypatch.setattr("syncline_design.report.progress_line.IN_LOG_S", 0.01)
+    monkeypatch.setattr("syncline_design.report.progress_line.ON_TERMINAL_S", 0.01)
+    with busy("writing results", quiet=False):
+        time.sleep(0.2)
+    assert capsys.readouterr().err.startswith("writing results (0 s)\n")

@@ -6,7 +6,7 @@ import functools
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, Protocol
@@ -234,14 +234,16 @@ def emit(
 
     charts: the documents whose charts go into a folder, by what the files' names begin with.
     """
+    from syncline_design.report.progress_line import busy
     from syncline_design.report.write import STDOUT, OutputTarget, write_outputs
 
     rendered: list[tuple[OutputTarget, str | bytes]] = []
-    for target in targets:
-        if target.format in formats.CHART_FORMATS:
-            rendered += _charts(target, charts())
-        else:
-            rendered.append((target, render(target.format)))
+    with busy("writing results", quiet=quiet) if targets else nullcontext():
+        for target in targets:
+            if target.format in formats.CHART_FORMATS:
+                rendered += _charts(target, charts())
+            else:
+                rendered.append((target, render(target.format)))
     if text and not quiet and not any(target.path == STDOUT for target in targets):
         rendered.append((OutputTarget("text", STDOUT), without_commands(text)))
     write_outputs(rendered)

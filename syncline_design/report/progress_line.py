@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
 from syncline_design.report import numbers
@@ -39,20 +42,24 @@ class ProgressLine:
 
 
 class StepLine:
-    """What a command is doing, once it takes longer than a second; on a terminal only."""
+    """What a command is doing: on a terminal a line that renews itself, once it takes longer than a
+    second; in a log a line now and then."""
 
     def __init__(self, stream: TextIO | None = None, *, quiet: bool = False) -> None:
         self._stream = stream or sys.stderr
-        self._live = not quiet and self._stream.isatty()
+        self._quiet = quiet
+        self._live = self._stream.isatty()
         self._last = 0.0
         self._shown = False
 
     def __call__(self, doing: str, elapsed_s: float) -> None:
         """Renew the line when it is time to."""
-        if not self._live or elapsed_s < SILENT_S or elapsed_s - self._last < ON_TERMINAL_S:
+        every_s = ON_TERMINAL_S if self._live else IN_LOG_S
+        if self._quiet or elapsed_s < SILENT_S or elapsed_s - self._last < every_s:
             return
-        self._last, self._shown = elapsed_s, True
-        self._stream.write(f"\r\x1b[2K{doing or 'working'} ({numbers.places(elapsed_s, 0)} s)")
+        self._last, self._shown = elapsed_s, self._live
+        text = f"{doing or 'working'} ({numbers.places(elapsed_s, 0)} s)"
+        self._stream.write(f"\r\x1b[2K{text}" if self._live else f"{text}\n")
         self._stream.flush()
 
     def clear(self) -> None:
@@ -61,6 +68,25 @@ class StepLine:
             self._stream.write("\r\x1b[2K")
             self._stream.flush()
             self._shown = False
+
+
+@contextmanager
+def busy(doing: str, *, quiet: bool) -> Iterator[None]:
+    """Signs of progress while something is done that cannot be asked how far it is."""
+    line, over, start = StepLine(quiet=quiet), threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        while not over.wait(ON_TERMINAL_S):
+            line(doing, time.monotonic() - start)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        over.set()
+        teller.join()
+        line.clear()
 
 
 def progress_text(progress: Progress) -> str:
