@@ -113,7 +113,7 @@ def test_the_front_of_an_infeasible_spec_says_which_designs_it_has(
         for end in ("cheapest", "most exact")
     )
     assert "32 742.35 EUR  575.6 cm  ACC-1: 575.6 cm where 5 cm is asked" in cheapest
-    assert "ublox_f9p_pvt by arrival, arrival" in cheapest
+    assert "u-blox F9P, no corrections" in cheapest
     assert "COST-1: 141 762.35 EUR where 60 000 EUR is asked" in exact
     page = html(on_verdict(verdict)).replace('<span class="whole">u-blox</span>', "u-blox")
     values = page[page.index("fig-front") :]

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+STRETCHES = 20  # of time, whose residuals are told together: more than a key is pressed through
+
+
 @dataclass(frozen=True, slots=True)
 class ResidualAxis:
     """Residuals of one axis [m] over the common time; signature: what the named effects explain."""
@@ -46,6 +49,7 @@ def residuals(
             if axis.after_m:
                 axes.plot(time_s, axis.after_m, ".", markersize=2.2, color=SERIES[0], label="after")
             axes.set_ylabel(axis.name)
+            _tell_stretches(axes, time_s, axis)
             low, high = axes.get_ylim()
             length_ticks(axes, low, high)
             scales.grid(axes)
@@ -59,6 +63,20 @@ def residuals(
     )
     size = (WIDTH, 60.0 + 100.0 * len(shown))
     return draw(name, "Residuals before and after", spoken, size, build)
+
+
+def _tell_stretches(axes: Axes, time_s: Sequence[float], axis: ResidualAxis) -> None:
+    """What the readings of a stretch of time come to, in its middle."""
+    rows = len(time_s)
+    for k in range(min(STRETCHES, rows)):
+        own = slice(k * rows // min(STRETCHES, rows), (k + 1) * rows // min(STRETCHES, rows))
+        times, before, after = time_s[own], axis.before_m[own], axis.after_m[own]
+        ends = [f"{numbers.places(at, 1)}\N{NO-BREAK SPACE}s" for at in (times[0], times[-1])]
+        said = [("Axis", axis.name), ("Time", " to ".join(ends)), ("Before", _rms_words(before))]
+        if after:
+            said.append(("After", _rms_words(after)))
+        middle = sum(times) / len(times)
+        tell(axes, middle, sum(before) / len(before) if before else 0.0, said)
 
 
 def _rms_words(values: Sequence[float]) -> str:

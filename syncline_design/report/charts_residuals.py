@@ -67,8 +67,10 @@ def track_map(track: PlottedTrack, name: str = "fig-track") -> InlineChart:
                 math.hypot(arrow.before_east_m, arrow.before_north_m),
                 math.hypot(arrow.after_east_m, arrow.after_north_m),
             )
+            place = (f"{numbers.places(arrow.east_m, 1)} m east, "
+                     f"{numbers.places(arrow.north_m, 1)} m north")  # fmt: skip
             tell(axes, arrow.east_m, arrow.north_m, [
-                ("Mean residual before", numbers.length(sizes[0], 3)),
+                ("Place", place), ("Mean residual before", numbers.length(sizes[0], 3)),
                 ("after", numbers.length(sizes[1], 3)),
             ])  # fmt: skip
         axes.margins(0.1)

@@ -66,7 +66,7 @@ def ends_table(found: Nearest, currency: str, limit: numbers.Limited | None) -> 
         [
             Cell(end), Cell(numbers.money(one.cost, currency), one.cost),
             Cell(numbers.error(one.error_m, limit), one.error_m), Cell(_all(one) or "nothing"),
-            *(Cell(f"{role.sensor} by {role.primitive}, {role.timestamping}")
+            *(Cell(f"{role.name} by {role.primitive}, {role.timestamping_name}")
               for _, _, role in one.design.roles),
         ]
         for end, points in named for one in points if one.design is not None
