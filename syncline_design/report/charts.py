@@ -155,7 +155,7 @@ def _limit_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
         label = axes.annotate(
             f"limit {numbers.limit(curve.limit)}{beyond}",
             (right, place),
-            xytext=(-4, 4 if above else -4),
+            xytext=(-4, 4 if above else -9),  # clear of a mark on the line
             textcoords="offset points",
             ha="right",
             va="bottom" if above else "top",
