@@ -24,6 +24,7 @@ from syncline_design.auditing.result import (
 from syncline_design.auditing.second_time import TwoTimes, two_times
 from syncline_design.auditing.series import in_words
 from syncline_design.auditing.stream import Examined, examined, is_receipt
+from syncline_design.auditing.swells import without_swells
 from syncline_design.auditing.together import held_together
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.stream import UNSET, Stream
@@ -121,7 +122,7 @@ def _rows(group: Sequence[FileStreams]) -> list[StreamAudit]:
     start = min(starts) if starts and max(starts) - min(starts) < 10**15 else None
     told = [(o, s) for o in group for s in o.streams if _is_told(s)]
     alone = [examined(stream, start) for _, stream in told]
-    found = held_together(without_recorder_clock(alone, start))
+    found = without_swells(held_together(without_recorder_clock(alone, start)))
     rows = [_row(o, one) for (o, _), one in zip(told, found, strict=True)]
     rows += [_untold(o, s) for o in group for s in o.streams if not _is_told(s)]
     return sorted(rows, key=lambda row: (row.file, row.name))
@@ -246,6 +247,7 @@ def _cannot_show(one: Examined, two: TwoTimes) -> tuple[str, ...]:
         grid = f"a grid of up to {in_words(grain_s)}"
         said.append(f"whether its clock drifts, or keeps an interval of its own that {grid} cuts "
                     "off to one and the same: no edge of it lies within the log")  # fmt: skip
+    said += one.undecided
     if one.breathing_s > 0.0:
         far = in_words(one.breathing_s)
         said.append(f"why receipts move to and fro by {far} while its stamps keep their rhythm: "

@@ -92,6 +92,7 @@ class Examined:
     overtaken: Disorder = Disorder()  # messages that came after later ones
     copied: bool = False  # receipts are the stamps once more
     hidden: arrival.Hidden | None = None  # what stamps on arrival could hide here
+    undecided: tuple[str, ...] = ()  # what its stamps may have done, or transport
 
 
 def examined(stream: Stream, start: int | None = None) -> Examined:
