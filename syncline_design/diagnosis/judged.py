@@ -59,7 +59,10 @@ class Judged:
 
     @property
     def log_p(self) -> float:
-        """log of the chance that noise alone makes values at least as large, the largest."""
+        """log of the chance that noise alone makes values at least as large, the largest.
+
+        Hotelling's T^2 needs more groups of rows than there are values: fewer say nothing.
+        """
         seen = np.diag(self.model) > 0.0
         size = int(np.sum(seen))
         if size == 0:
@@ -68,6 +71,8 @@ class Judged:
         found = self.model_log_p
         for covariance, count in self.jackknives:
             own = count - size
+            if own <= 0:
+                continue
             share = _square(values, covariance[seen][:, seen]) * own / (size * (count - 1))
             found = max(found, log_f(share, size, own))
         return found
