@@ -23,6 +23,7 @@ from syncline_design.diagnosis.plotted import (
     Residuals,
 )
 from syncline_design.diagnosis.result import (
+    Check,
     Diagnosis,
     Estimate,
     Finding,
@@ -92,16 +93,17 @@ def tell(told: Told) -> Diagnosis:
     found = [*_undone(told), *(_finding(told, one, weights) for one in told.named.terms)]
     found.sort(key=lambda f: (not f.material, -f.gain_nat))
     left_m = max((run.left_m for run in told.runs), default=0.0)
-    odd = any(run.left_material for run in told.runs)
+    checks = tuple(_checks(told))
+    odd = any(run.left_material and not run.checks for run in told.runs)
     explained = any(f.material for f in found)
     verdict: LogOutcome = "explained" if explained else "agrees"
-    if odd or (told.unlike and not explained):
+    if odd or checks or (told.unlike and not explained):
         verdict = "unexplained"
     shown = tuple(_seen(told))
     return Diagnosis(
         verdict=verdict,
-        sound=True,
-        checks=(),
+        sound=not checks,
+        checks=checks,
         findings=tuple(found),
         remaining=Remaining(odd, told.spec_m, odd, None, (), left_m, odd),
         where=(),
@@ -120,6 +122,14 @@ def tell(told: Told) -> Diagnosis:
         joint=_joint(told),
         system=description(pinned_system(told.case)),
     )
+
+
+def _checks(told: Told) -> Iterator[Check]:
+    """Where a log contradicts itself or the limits of the spec's platform, each with its files."""
+    for run in told.runs:
+        files = ", ".join(run.files)
+        for check in run.checks or ():
+            yield replace(check, message=f"in {files}: {check.message}")
 
 
 def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
