@@ -161,3 +161,25 @@ def test_no_transport_brings_messages_sooner(tmp_path: Path, seed: int) -> None:
     found = rows(tmp_path, {"laser": (t + 0.05 * meanwhile(t), came(t, seed))})
     (step,) = counted(found["laser"])
     assert step.parameters["seconds"] == pytest.approx(0.05, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("left_s", [4.0, 8.0, 20.0])
+@pytest.mark.parametrize("shared", [True, False])
+def test_what_lasts_to_the_end_of_the_log(
+    tmp_path: Path, shared: bool, left_s: float, seed: int
+) -> None:
+    """A load of one bus with an even stream on it, or the events' own clock; others are quiet."""
+    sensors = {"imu": 50.0, "gnss": 10.0, "odometer": 25.0}
+    streams = {}
+    for k, (name, rate) in enumerate(sensors.items()):
+        t = even(rate, LENGTH_S)
+        load = 0.04 * np.clip((t - LENGTH_S + left_s) / 0.3, 0.0, 1.0)
+        streams[name] = (t, came(t, seed + k, load if shared and name == "imu" else 0.0))
+    t = events(20.0, seed)
+    load = 0.04 * np.clip((t - LENGTH_S + left_s) / 0.3, 0.0, 1.0)
+    own = 0.04 * (t > LENGTH_S - left_s)
+    streams["laser"] = (t, came(t, seed, load)) if shared else (t - own, came(t, seed))
+    found = rows(tmp_path, streams)
+    assert names(found["laser"]) == ([] if shared else ["step"])
+    assert all(names(found[name]) == [] for name in sensors)

@@ -34,24 +34,26 @@ _EDGE: Final = 6  # messages about the moment at which stamps may fall
 
 @dataclass(frozen=True, slots=True)
 class _Stretch:
-    """Between which moments [s] receipts are later by so much, or less (None: to the end)."""
+    """Between which moments [s] receipts are later, or sooner, by so much; lasts: to the end."""
 
     begin_s: float
-    end_s: float | None
+    end_s: float
     size_s: float
+    lasts: bool
 
     def inside(self, time_s: Array) -> Mask:
         after = time_s >= self.begin_s
-        return after if self.end_s is None else after & (time_s < self.end_s)
+        return after if self.lasts else after & (time_s < self.end_s)
 
     def parts(self) -> list[tuple[float, float]]:
         """Before it, its first and its second half, after it."""
         least, most = _BESIDE_S
-        length = 2.0 * most if self.end_s is None else self.end_s - self.begin_s
+        length = self.end_s - self.begin_s
+        length = min(length, 2.0 * most) if self.lasts else length
         beside = min(max(length, least), most)
         middle, end = self.begin_s + 0.5 * length, self.begin_s + length
         found = [(self.begin_s - beside, self.begin_s), (self.begin_s, middle), (middle, end)]
-        return found if self.end_s is None else [*found, (end, end + beside)]
+        return found if self.lasts else [*found, (end, end + beside)]
 
 
 def without_swells(streams: Sequence[Examined]) -> list[Examined]:
@@ -82,12 +84,12 @@ def _stretch(one: Examined, fault: StampFault) -> _Stretch | None:
     if any(s.side == "stamp" and s.at_s == fault.from_s for s in one.shifts):
         return None
     last = float(one.series.seconds[one.series.good][-1])
-    end = None if fault.to_s is None or fault.to_s >= last else fault.to_s
-    return _Stretch(fault.from_s, end, -float(fault.parameters["seconds"]))
+    end = last if fault.to_s is None else min(fault.to_s, last)
+    return _Stretch(fault.from_s, end, -float(fault.parameters["seconds"]), end >= last)
 
 
 def _undecided(stretch: _Stretch) -> str:
-    span = f"from {to_digits(stretch.begin_s, 4)} to {to_digits(stretch.end_s or 0.0, 4)} s"
+    span = f"from {to_digits(stretch.begin_s, 4)} to {to_digits(stretch.end_s, 4)} s"
     return (f"whether its stamps went back by {in_words(stretch.size_s)} {span}, or its messages "
             "took longer: it has no rhythm, and no stream beside it tells")  # fmt: skip
 
@@ -174,7 +176,7 @@ def _smooth(values: Array) -> Array:
 
 def _may_be_transport(one: Examined, stretch: _Stretch) -> bool:
     """Whether receipts are later and come back, and stamps do not fall where this begins."""
-    if stretch.end_s is None or stretch.size_s < 0.0:
+    if stretch.lasts or stretch.size_s < 0.0:
         return False
     whole = one.whole
     places = whole.places()
