@@ -139,6 +139,18 @@ CASES = {
     ),
     "infeasible now": (FAILING, OPEN, 1, {}),
     "infeasible before": (OPEN, FAILING, 0, {}),
+    "a waiver makes no figure better": (
+        FAILING,
+        changed(FAILING, (ACCURACY, "limit: 0.2 m, waiver: {reason: trial, expires: 2999-12-31}")),
+        0,
+        {"ACC-1": "worse"},
+    ),
+    "waived now, and as it was": (
+        FAILING,
+        changed(FAILING, (ACCURACY, f"{ACCURACY}, waiver: {{reason: trial, expires: 2999-12-31}}")),
+        0,
+        {"ACC-1": "same"},
+    ),
     "a waiver goes": (
         changed(FAILING, (ACCURACY, f"{ACCURACY}, waiver: {{reason: trial, expires: 2999-12-31}}")),
         FAILING,

@@ -212,7 +212,8 @@ def test_hostile_names_stay_text(tmp_path: Path, hostile: str) -> None:
 
 def test_progress_says_what_is_left() -> None:
     assert progress_text(Progress(0, 10, 0, 0.0)) == "0 of 10 cases, estimating"
-    assert progress_text(Progress(6, 10, 2, 8.0)) == "6 of 10 cases, 2 already there, 00:08 left"
+    assert progress_text(Progress(6, 10, 2, 80.0)) == "6 of 10 cases, 2 already there, 01:20 left"
+    assert progress_text(Progress(5, 9999, 0, 9.0)) == "5 of 9999 cases, estimating"  # 5 h
     assert progress_text(Progress(10, 10, 0, 3725.0)) == "10 of 10 cases, took 1:02:05"
     assert "1 done again" in progress_text(Progress(1, 2, 0, 1.0, retried=1))
 

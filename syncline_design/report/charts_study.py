@@ -42,6 +42,7 @@ _UNPRICED = {
     "refused": COMBINED,
 }
 _WAIVED = ", with a waived requirement missed"
+MOST_BESIDE = 22  # characters of a label with another beside it, that a phone holds
 MOST_LABEL = 44  # characters of a front's in a legend
 MOST_TEXT = 8  # cells across in which the cost itself still fits
 PATCH = 24.0  # of the scale, with what is around it [SVG units]
@@ -227,7 +228,7 @@ def sampled_cases(
             chosen = [(p.x, p.y) for p in data.points if p.verdict in verdicts]
             if chosen:
                 axes.plot(*zip(*chosen, strict=True), marker, color=colour, markersize=5 * size,
-                          label=f"{word} ({len(chosen)})")  # fmt: skip
+                          label=f"{word} ({numbers.count(len(chosen))})")  # fmt: skip
         _meeting(axes, data, meeting, costs, size)
         for point, words in zip(data.points, says, strict=False):
             tell(axes, point.x, point.y, words)
@@ -235,7 +236,8 @@ def sampled_cases(
         _scatter_axis(axes, "y", data.y)
         scales.grid(axes)
         _cost_scale(figure, costs, currency, ends=MARK)
-        figure.legend(loc="outside lower left", ncols=2)
+        told = max((len(words) for words in axes.get_legend_handles_labels()[1]), default=0)
+        figure.legend(loc="outside lower left", ncols=2 if told <= MOST_BESIDE else 1)
 
     spoken = f"{len(meeting)} of {len(data.points)} sampled cases meet their requirements."
     height = 360.0 if not data.y.words else 190.0 + 40.0 * len(data.y.words)
@@ -261,7 +263,8 @@ def _meeting(
         which = f": {shortened(data.kinds[kind], 26)}" if data.kinds else ""
         axes.plot([], [], SHAPES[kind % len(SHAPES)], markersize=7,
                   markerfacecolor=(SERIES[0], sum(MARK) / 2),
-                  markeredgecolor=SERIES[0], label=f"meets{which} ({count})")  # fmt: skip
+                  markeredgecolor=SERIES[0],
+                  label=f"meets{which} ({numbers.count(count)})")  # fmt: skip
 
 
 def _scatter_axis(axes: Axes, which: Literal["x", "y"], axis: ScatterAxis) -> None:

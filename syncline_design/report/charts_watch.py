@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from statistics import median
+from textwrap import wrap
 from typing import TYPE_CHECKING, Final
 
 from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_text
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 Key = tuple[str, str, str, str]  # effect, sensor, stage, parameter
 ACROSS: Final = 2
 HEIGHT: Final = 130.0  # of a row of panels
+PANEL_LETTERS: Final = 18  # of a line of a panel's title, on a phone too
 MOST: Final = 1e12
 SINGLE: Final = 100  # runs up to which each has a mark of its own
 
@@ -114,10 +116,14 @@ def _panel(
             axes.axvline(place - 0.5, color=BAD, linewidth=1.0, linestyle=(0, (4, 3)))
     effect, sensor, _, parameter = key
     name = effect.replace("_", " ")
-    title = f"{shortened(name, 26)}\n{sensor}" if many else shortened(f"{name} ({sensor})", 40)
+    lines = wrap(
+        f"{name} {sensor}", PANEL_LETTERS, max_lines=2, placeholder="\N{HORIZONTAL ELLIPSIS}"
+    )
+    title = "\n".join(lines) if many else shortened(f"{name} ({sensor})", 40)
     axes.set_title(title, loc="left", pad=3)
     figure, _, _ = parameter.rpartition("_")
-    axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
+    words = scales.power_of_ten(scale) if unit.startswith("1e") else unit
+    axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f' [{words}]' if words else ''}")
     _run_ticks(axes, [r.run for r in runs])
     axes.margins(x=0.06)
 
@@ -224,7 +230,8 @@ def _logs_panel(
             ("95 % interval", _interval(low / size, high / size, named)),
         ])  # fmt: skip
     figure, _, _ = parameter.rpartition("_")
-    axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f', {unit}' if unit else ''}")
+    words = scales.power_of_ten(scale) if unit.startswith("1e") else unit
+    axes.set_ylabel(f"{(figure or parameter).replace('_', ' ')}{f' [{words}]' if words else ''}")
     axes.set_xlabel("log")
     _whole_ticks(axes, [one.log for one in logs])
     axes.margins(x=0.08)

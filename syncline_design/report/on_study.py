@@ -90,7 +90,7 @@ def on_study(result: StudyResult) -> Document:
             *section("misses", "Which requirements fail",
                      _missed(summary), "What fails"),
             *section("refused", "Which cases cannot be as combined", _refused(summary),
-                     reach="text"),
+                     "Refused"),
             *section("ends", "Where feasibility ends", _ends(summary), "Where it ends"),
             *section("fronts", "Cost against error, front by case", _fronts(summary), "Fronts"),
             *section("cases", "Cases", cases),
@@ -328,13 +328,13 @@ def _ended(brief: Brief) -> Outcome:
 
 
 def _refused(summary: StudySummary) -> list[Node]:
-    """Why cases cannot be as combined, each reason once; a page has it in its table of cases."""
+    """Why cases cannot be as combined, each reason once."""
     cases = (summary.result.case(b.number - 1) for b in summary.briefs if b.verdict == "refused")
     count = Counter(visible(reason(case)) for case in cases)
     told = [f"{why} ({numbers.count(n)} of {numbers.count(len(summary.briefs))})"
             for why, n in count.most_common(MOST_DOWN)]  # fmt: skip
     left = len(count) - len(told)
-    more = [f"and {numbers.count(left)} further reasons: see the page or the CSV"] if left else []
+    more = [f"and {numbers.count(left)} further reasons: see the CSV"] if left else []
     return [Items((*told, *more))] if told else []
 
 

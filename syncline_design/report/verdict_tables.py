@@ -226,9 +226,10 @@ def _too_small(syncline: SynclineFigures, limit: RequirementResult | None) -> st
     count = len(syncline.ledger) - len(shown)
     if not count:
         return ""
-    words = "1 term is" if count == 1 else f"{count} terms are"
-    together = numbers.error(rest, limit)
-    return f"{words} below 0.1 % of the total and have no row; together {together}."
+    amount = numbers.error(rest, limit)
+    if count == 1:
+        return f"1 term is below 0.1 % of the total and has no row: {amount}."
+    return f"{count} terms are below 0.1 % of the total and have no row; together {amount}."
 
 
 def models(syncline: SynclineFigures, limit: RequirementResult | None) -> Table:

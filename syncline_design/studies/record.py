@@ -91,6 +91,11 @@ class CaseRecord(Record):
         return waived_misses(self.requirements) if self.verdict == "meets" else ()
 
     @property
+    def excused(self) -> tuple[str, ...]:
+        """Ids of requirements that are missed under a waiver in force, whatever else is."""
+        return waived_misses(self.requirements)
+
+    @property
     def unsettled(self) -> bool:
         """Whether the time limit left open which of its requirements stand in the way."""
         why = self.infeasibility

@@ -10,6 +10,8 @@ from syncline_design.machine.records import Json
 from syncline_design.studies.data import study_data
 from syncline_design.studies.finished import Finished
 
+FEW, EARLY_S = 20, 20.0  # cases and seconds before which their rate tells nothing
+
 
 @dataclass(frozen=True)
 class StudyResult(Finished, Shown):
@@ -32,10 +34,12 @@ class Progress:
 
     @property
     def remaining_s(self) -> float | None:
-        """What is left at the rate so far; None while there is no rate yet."""
+        """What is left at the rate so far; None while there is none that tells."""
         computed = self.done - self.reused
         if computed <= 0:
             return None if self.done < self.total else 0.0
+        if computed < FEW and self.elapsed_s < EARLY_S:
+            return None  # starting the workers is most of it
         return self.elapsed_s / computed * (self.total - self.done)
 
 

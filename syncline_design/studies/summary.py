@@ -34,7 +34,8 @@ class Brief:
     error_m: float | None
     picks: tuple[RolePick, ...]
     failing: tuple[str, ...] = ()  # ids of requirements, waived ones too
-    waived: tuple[str, ...] = ()
+    waived: tuple[str, ...] = ()  # of a case that meets all the same
+    excused: tuple[str, ...] = ()  # of any case: what a waiver in force covers
     unsettled: bool = False  # the time limit left open which of its requirements fail
 
     @property
@@ -108,7 +109,7 @@ class Winner(RolePick):
 class Miss:
     """One requirement that cases miss, or cannot meet together with others: in how many, and where.
 
-    waived: cases of these that meet all the same.
+    waived: cases of these in which a waiver in force covers it.
     """
 
     requirement: str
@@ -161,7 +162,7 @@ def _brief(case: CaseResult) -> Brief:
     return Brief(
         case.number, case.base, tuple(case.labels.values()), record.verdict, record.cost,
         case.currency, record.error_m, tuple(record.picks), record.failing, record.waived,
-        record.unsettled,
+        record.excused, record.unsettled,
     )  # fmt: skip
 
 
@@ -275,7 +276,7 @@ def misses(summary: StudySummary, show: Shown = lambda _, label: label) -> list[
     for name in summary.missed:
         failing = [brief for brief in summary.briefs if name in brief.failing]
         where = tuple(_extent(one, {b.labels[i] for b in failing}, show) for i, one in several)
-        waived = sum(name in brief.waived for brief in failing)
+        waived = sum(name in brief.excused for brief in failing)
         found.append(Miss(name, len(failing), waived, where))
     return sorted(found, key=lambda one: -one.cases)
 

@@ -80,7 +80,7 @@ def row(case: CaseResult, units: Mapping[str, str | None]) -> Row:
         found[pick.role] = pick.sensor
         found[f"{pick.role} timestamping"] = pick.timestamping
     found["failing"] = " ".join(record.failing)
-    found["waived"] = " ".join(record.waived)
+    found["waived"] = " ".join(record.excused)
     found["not_simulated"] = " ".join(record.not_simulated)
     found["reason"] = reason(case)
     return found

@@ -111,7 +111,8 @@ def _fell(verdict: Verdict, before: Verdict) -> bool:
 
 def _since(now: RequirementResult, then: RequirementResult) -> SinceBaseline:
     step = _standing(now) - _standing(then)
-    if step == 0 and now.status == "fail" and now.unit == then.unit:
+    both_missed = now.status == then.status == "fail"
+    if both_missed and step <= 0 and now.unit == then.unit:  # a waiver makes no figure better
         step = _further(now, then) - _further(then, now)
     return _word(step)
 

@@ -75,7 +75,8 @@ def _amount(case: Case, each: Quantity | None, count: int) -> float | None:
 
 
 def _basis(entry: Product, owned: bool) -> str:
-    """What cost, mass and power stand on: `source`, or which of them on what else.
+    """What cost, mass and power stand on: `source`, `stated` where an entry names none, or which of
+    them on what else.
 
     Nothing weighs nothing and needs no source.  Of what is owned: `owned`, and what else its mass
     and power stand on.
@@ -83,7 +84,8 @@ def _basis(entry: Product, owned: bool) -> str:
     stated = {name: getattr(entry, name) for name in _RESOURCES}
     told = [name for name, each in stated.items() if each is not None and each.exact != 0]
     told = told or [name for name, each in stated.items() if each is not None]
-    kinds = {name: entry.basis_of(name) or "source" for name in told}
+    own = "source" if entry.source else "stated"
+    kinds = {name: entry.basis_of(name) or own for name in told}
     if owned:
         rest = (f"{k}: {kind}" for k, kind in kinds.items() if (k, kind) != (k, "source"))
         return ", ".join(("owned", *(one for one in rest if not one.startswith("cost"))))
