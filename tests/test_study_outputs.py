@@ -250,6 +250,6 @@ def test_drawing_says_so_where_it_takes_longer_than_a_second(
     monkeypatch.setattr("syncline_design.report.progress_line.SILENT_S", 0.01)
     monkeypatch.setattr("syncline_design.report.progress_line.IN_LOG_S", 0.01)
     monkeypatch.setattr("syncline_design.report.progress_line.ON_TERMINAL_S", 0.01)
-    with busy("writing results", quiet=False):
+    with busy("writing results"):
         time.sleep(0.2)
     assert capsys.readouterr().err.startswith("writing results (0 s)\n")

@@ -22,6 +22,7 @@ from syncline_design.auditing.lasting_jumps import Jump, lasting, of_the_clock, 
 from syncline_design.auditing.naming import is_whole, slipped
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import (
+    MEDIAN_SIGMA,
     NS,
     Array,
     Mask,
@@ -62,7 +63,6 @@ _BEAT: Final = 0.1  # of the time between them
 _PARTS: Final = (1, 2, 3)  # of the least time between jumps
 _EQUAL: Final = 0.02
 _WHOLE: Final = 0.25  # of an interval: how near a jump by whole ones is to the level's
-_SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +217,7 @@ def _level(before: Array, after: Array, width: float, clear_s: float) -> tuple[f
         if min(one.size, other.size) < _LEAST:
             return 0.0, 0.0
         moved = float(np.median(other) - np.median(one))
-        sure = _SIGMA * width * float(np.sqrt(1.0 / one.size + 1.0 / other.size)) + 1e-12
+        sure = MEDIAN_SIGMA * width * float(np.sqrt(1.0 / one.size + 1.0 / other.size)) + 1e-12
         if 3.0 * sure < clear_s:
             break
     return moved, sure

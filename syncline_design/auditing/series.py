@@ -13,6 +13,7 @@ from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 NS = 1e9
+MEDIAN_SIGMA = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
 _FEW = 256  # numbers; beyond it numpy's partition is quicker than to sort them
 UNIX_S = 6e8  # later than this since 1970: a calendar's clock (1989)
 

@@ -17,7 +17,16 @@ import numpy as np
 
 from syncline_design.auditing.residual import residual_of
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Array, Mask, Series, in_words, seconds, spread
+from syncline_design.auditing.series import (
+    MEDIAN_SIGMA,
+    NS,
+    Array,
+    Mask,
+    Series,
+    in_words,
+    seconds,
+    spread,
+)
 from syncline_design.auditing.stream import Examined
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits
@@ -28,7 +37,6 @@ _LEAST: Final = 5  # messages in each part of it
 _AROUND: Final = 2  # messages on each side that tell a level
 _JITTER: Final = 6.0  # times: what stamps scatter by is below what they would have to show
 _SURE: Final = 3.0
-_SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
 _EDGE: Final = 6  # messages about the moment at which stamps may fall
 
 
@@ -164,7 +172,7 @@ def _medians(time_s: Array, values: Array, stretch: _Stretch) -> Iterator[float]
 
 def _uncertainty(values: Array) -> float:
     """Of their median, slow changes apart."""
-    return _SIGMA * spread(np.diff(values)) / float(np.sqrt(2.0 * values.size))
+    return MEDIAN_SIGMA * spread(np.diff(values)) / float(np.sqrt(2.0 * values.size))
 
 
 def _smooth(values: Array) -> Array:

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.pauses import LONG_GAP
-from syncline_design.auditing.series import Array, Mask, Series, seconds, spread
+from syncline_design.auditing.series import MEDIAN_SIGMA, Array, Mask, Series, seconds, spread
 
 _JITTER: Final = 10.0  # times: how near to whole intervals such a hole is
 _LEAST_S: Final = 2e-5
 _SLOW: Final = 2e-4  # of a hole: oscillators wander by less within it
 _APART: Final = 6  # messages: receipts in bunches are even from one to the next
-_SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
 _SURE: Final = 3.0  # sigma
 _TOLD: Final = 0.25  # of an interval: levels that are known to less tell whole ones apart
 _NEXT: Final = 8  # messages on each side of an interval that is counted
@@ -73,7 +72,7 @@ def _whole_holes(pace: Cadence) -> Mask:
 def _uncertainty(late: Array, many: int) -> float:
     """Of a change of the median of so many messages on each side [s]."""
     width = min(spread(late), spread(late[_APART:] - late[:-_APART]))
-    return _SIGMA * width * float(np.sqrt(2.0 / many)) + 1e-12
+    return MEDIAN_SIGMA * width * float(np.sqrt(2.0 / many)) + 1e-12
 
 
 def _set_back(

@@ -238,7 +238,7 @@ def emit(
     from syncline_design.report.write import STDOUT, OutputTarget, write_outputs
 
     rendered: list[tuple[OutputTarget, str | bytes]] = []
-    with busy("writing results", quiet=quiet) if targets else nullcontext():
+    with busy("writing results") if targets and not quiet else nullcontext():
         for target in targets:
             if target.format in formats.CHART_FORMATS:
                 rendered += _charts(target, charts())

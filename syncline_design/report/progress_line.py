@@ -71,9 +71,9 @@ class StepLine:
 
 
 @contextmanager
-def busy(doing: str, *, quiet: bool) -> Iterator[None]:
+def busy(doing: str) -> Iterator[None]:
     """Signs of progress while something is done that cannot be asked how far it is."""
-    line, over, start = StepLine(quiet=quiet), threading.Event(), time.monotonic()
+    line, over, start = StepLine(), threading.Event(), time.monotonic()
 
     def tell() -> None:
         while not over.wait(ON_TERMINAL_S):
