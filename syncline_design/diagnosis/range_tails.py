@@ -6,7 +6,7 @@ l_i what one standard deviation of the range does and R = L L',
 y is 1 + t^2 lambda in variance if ranges are normal, t times the spec's; what is across it says
 nothing of them.  Student's t or outliers have to beat that, and by more than the same of any other
 sensor, whose noise lies in other directions.  They also have to beat normal noise of another size
-in every sixth of each covariate: noise that grows with the range or is loud for a while has no
+in every sixteenth of each covariate: noise that grows with the range or is loud for a while has no
 tails.
 """
 
