@@ -111,3 +111,13 @@ def test_the_example_of_a_help_is_a_call_of_its_command(name: str) -> None:
     for word in words:
         if re.match(r"(specs|examples)/", word):
             assert (ROOT / word).is_file()
+
+
+@pytest.mark.parametrize("group", ["", "catalog", "log"])
+def test_the_help_of_a_group_ends_with_an_example_of_one_of_its_commands(group: str) -> None:
+    shown = CliRunner().invoke(app, [*group.split(), "--help"], env={"COLUMNS": "80"}).output
+    told = (
+        shown.rstrip().splitlines()[-1].removeprefix(f" Example: syncline-design {group}".rstrip())
+    )
+    name, _, words = told.strip().partition(" ")
+    assert EXAMPLES[f"{group} {name}".strip()] == words

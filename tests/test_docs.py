@@ -62,6 +62,7 @@ def test_the_tutorial_runs_from_top_to_bottom(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "120")  # as the page says
     page = (DOCS / "tutorial.md").read_text(encoding="utf-8")
     printed: list[str] = []
     for block in BLOCK.finditer(page):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ from diagnosis_samples import CLOSED, diagnosis
 from html_page import Page
 from syncline_design.model.written import beside
 from syncline_design.report import numbers
-from syncline_design.report.axes import in_view, log_ticks
+from syncline_design.report.axes import in_view, log_ticks, set_ticks, short_length
 from syncline_design.report.charts import WIDTH, LedgerBar, SynclineCurve, ledger, syncline
 from syncline_design.report.charts_clocks import ClockedVehicle, Stamped, clocks
 from syncline_design.report.charts_distribution import DensityBars, error_histogram
@@ -333,3 +334,24 @@ def test_a_front_stands_before_all_designs_but_those_that_leave_it_no_room() -> 
     seen = [FrontMark(30.0, 29.0, False), FrontMark(500.0, 0.1, False)]
     unseen = [FrontMark(600.0, 1.0, False), FrontMark(100.0, 31.0, False)]
     assert in_view([*seen, *unseen], [100.0, 200.0], 1.0, None) == seen
+
+
+def test_the_ticks_of_an_axis_have_one_unit_where_one_serves_them_all() -> None:
+    """`0.1 m ... 100 m`, not `100 mm ... 100 m`; but 10 um is not written 0.00001 m."""
+    told = {
+        (0.1, 1.0, 10.0, 100.0): ["0.1 m", "1 m", "10 m", "100 m"],
+        (0.0, 0.0005, 0.001, 0.0015): ["0", "0.5 mm", "1 mm", "1.5 mm"],
+        (1e-5, 1e-3, 0.1, 10.0): ["10 \N{MICRO SIGN}m", "1 mm", "100 mm", "10 m"],
+        (-0.002, 0.0, 0.001): ["\N{MINUS SIGN}2 mm", "0", "1 mm"],
+    }
+    for places, labels in told.items():
+        assert _labels(places, lambda v: "0" if v == 0 else short_length(v)) == labels
+    counts = [1.0, 10.0, 100.0, 1000.0, 10000.0]
+    assert _labels(counts, numbers.count) == ["1", "10", "100", "1 000", "10 000"]
+    assert _labels([1500.0, 2000.0], numbers.count) == ["1 500", "2 000"]
+
+
+def _labels(places: Sequence[float], label: Callable[[float], str]) -> list[str]:
+    axes = Figure().add_subplot()
+    set_ticks(axes, "y", places, label)
+    return [text.get_text().replace("\N{NO-BREAK SPACE}", " ") for text in axes.get_yticklabels()]

@@ -38,7 +38,14 @@ COMPLETION = "_SYNCLINE_DESIGN_COMPLETE"  # a shell's question: source_bash, com
 
 
 class _Commands(TyperGroup):
-    """The commands; an empty argument (an unset variable, say) is not the working folder."""
+    """The commands; an empty argument (an unset variable, say) is not the working folder.
+
+    Its help ends with an example too: of a command of its own.
+    """
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        super().format_help(ctx, formatter)
+        _tell_example(f"{_called(ctx)} {FIRST[ctx.info_name if ctx.parent else '']}".strip())
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         for argument in args:
@@ -58,12 +65,20 @@ class _Command(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         super().format_help(ctx, formatter)
-        words: list[str] = []
-        while ctx.parent is not None:
-            words.insert(0, ctx.info_name)
-            ctx = ctx.parent
-        name = " ".join(words)
-        typer.echo(f" Example: syncline-design {name} {EXAMPLES[name]}\n")
+        _tell_example(_called(ctx))
+
+
+def _called(ctx: Any) -> str:
+    """The words by which a command was called, without the program's: `catalog list`."""
+    words: list[str] = []
+    while ctx.parent is not None:
+        words.insert(0, ctx.info_name)
+        ctx = ctx.parent
+    return " ".join(words)
+
+
+def _tell_example(name: str) -> None:
+    typer.echo(f" Example: syncline-design {name} {EXAMPLES[name]}\n")
 
 
 def each_output(args: list[str]) -> list[str]:
@@ -93,12 +108,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 catalog = typer.Typer(
-    help="Look into the built-in catalogs, check and grow your own.", no_args_is_help=True
-)
+    help="Look into the built-in catalogs, check and grow your own.", no_args_is_help=True,
+    cls=_Commands,
+)  # fmt: skip
 app.add_typer(catalog, name="catalog")
-log = typer.Typer(help="Look into logs of every kind.", no_args_is_help=True)
+log = typer.Typer(help="Look into logs of every kind.", no_args_is_help=True, cls=_Commands)
 app.add_typer(log, name="log")
 
+FIRST = {"": "init", "catalog": "list", "log": "inspect"}  # the example of a group of commands
 EXAMPLES = {  # by command, what its help ends with
     "check": "specs/uav_corridor.yaml -o html -o junit:result.xml",
     "optimize": "specs/uav_corridor.yaml --pareto --best 3 -o html",

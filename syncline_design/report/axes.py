@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 FAR = 30.0  # times the largest error of a front: beyond it no other design is drawn
 DEAR = 2.5  # times the end of the front's axis of prices: the same
+GAP_OF_UNIT = "\N{NO-BREAK SPACE}"
 LETTER, GAP = 5.8, 7.0  # width of a letter of a label, and between two labels [SVG units]
 _SUPERSCRIPT = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
@@ -90,6 +91,28 @@ def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
     return [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]
 
 
+def _in_one_unit(places: Sequence[float], labels: list[str]) -> list[str]:
+    """Labels of an axis in one unit, `0.1 m ... 100 m`, where one serves all its ticks.
+
+    places: of the ticks, in the SI unit of their labels. One serves where none is below a
+    hundredth or above 9 999 of it: a tick of 0.00001 m is read worse than one of 10 um.
+    """
+    units = dict.fromkeys(text.partition(GAP_OF_UNIT)[2] for text in labels if text != "0")
+    if len(units) < 2 or not all(unit[:1].isalpha() for unit in units):
+        return labels  # one already, or counts with grouped thousands
+    for shown in reversed(labels):
+        alike = [text if text == "0" else numbers.like(shown, place, 3)
+                 for place, text in zip(places, labels, strict=True)]  # fmt: skip
+        figures = [abs(_figure(text)) for text in alike if text != "0"]
+        if min(figures) >= 0.01 and max(figures) <= 9999.0:
+            return alike
+    return labels
+
+
+def _figure(text: str) -> float:
+    return float(text.partition(GAP_OF_UNIT)[0].replace("\N{MINUS SIGN}", "-"))
+
+
 def set_ticks(
     axes: Axes, which: Literal["x", "y"], ticks: Iterable[float], label: Callable[[float], str],
     room: float = 270.0,
@@ -103,7 +126,7 @@ def set_ticks(
 
     places = list(ticks)
     axis = axes.xaxis if which == "x" else axes.yaxis
-    labels = [label(place) for place in places]
+    labels = _in_one_unit(places, [label(place) for place in places])
     if which == "x" and len(labels) > 1:
         widest = LETTER * max(len(text) for text in labels) + GAP
         step = max(1, math.ceil(widest * (len(labels) - 1) / room))

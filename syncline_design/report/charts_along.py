@@ -87,7 +87,7 @@ def over_key(
 
     meeting = sum(point.verdict == "meets" for point in data.points)
     key = short_key(data.axis.key)
-    spoken = f"{meeting} of {len(data.points)} cases meet their requirements."
+    spoken = f"{numbers.share_of(meeting, len(data.points))} cases meet their requirements."
     if known:
         spoken += f" Errors from {numbers.error(min(known), limit)} to "
         spoken += f"{numbers.error(max(known), limit)}."
@@ -154,11 +154,13 @@ def _groups(data: KeySweep) -> list[_Group]:
         style = SHAPES[kind % len(SHAPES)], SERIES[kind % len(SERIES)]
         size = 5.0 + 3.0 * kind  # one around the other, where bases come to the same
         fill: Fill = "left" if waived else "none" if kind else "full"
-        found.append(_Group(f"meets{which} ({len(chosen)})", *style, chosen, size, fill))
+        found.append(
+            _Group(f"meets{which} ({numbers.count(len(chosen))})", *style, chosen, size, fill)
+        )
     for verdict, (marker, colour, word) in _MARKS.items():
         chosen = [k for k, point in enumerate(data.points) if point.verdict == verdict]
         if chosen:
-            found.append(_Group(f"{word} ({len(chosen)})", marker, colour, chosen))
+            found.append(_Group(f"{word} ({numbers.count(len(chosen))})", marker, colour, chosen))
     return found
 
 

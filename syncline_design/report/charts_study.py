@@ -239,7 +239,9 @@ def sampled_cases(
         told = max((len(words) for words in axes.get_legend_handles_labels()[1]), default=0)
         figure.legend(loc="outside lower left", ncols=2 if told <= MOST_BESIDE else 1)
 
-    spoken = f"{len(meeting)} of {len(data.points)} sampled cases meet their requirements."
+    spoken = (
+        f"{numbers.share_of(len(meeting), len(data.points))} sampled cases meet their requirements."
+    )
     height = 360.0 if not data.y.words else 190.0 + 40.0 * len(data.y.words)
     return draw(name, "Sampled cases over two factors", spoken, (WIDTH, height), build)
 

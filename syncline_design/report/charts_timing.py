@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+BEYOND: Final = 1.1  # an axis with a bound at both sides ends a little beyond it
 FAR: Final = 10.0  # a bound so many times the largest offset would leave the offsets a flat line
 
 
@@ -52,6 +53,8 @@ def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
         for side in (-1.0, 1.0):
             if bound_s and in_sight(trace, bound_s):
                 axes.axhline(side * bound_s, color=SERIES[1], linewidth=1.2, linestyle=(0, (5, 3)))
+        if bound_s and in_sight(trace, bound_s):
+            axes.set_ylim(-BEYOND * bound_s, BEYOND * bound_s)
         low, high = axes.get_ylim()
         scales.set_ticks(axes, "y", _linear(low, high), _time_or_zero)
         axes.set_xlabel(f"{unit} of operation, sessions one after another")

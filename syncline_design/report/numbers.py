@@ -166,6 +166,11 @@ def count(value: Any) -> str:
     return MISSING if amount is None else f"{amount:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
 
 
+def share_of(some: int, whole: int) -> str:
+    """`1 608 of 4 000`, which no line tears."""
+    return f"{count(some)}\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}{count(whole)}"
+
+
 def percent(fraction: Any, digits: int = 3) -> str:
     """0.124 as `12.4 %`."""
     amount = finite(fraction)

@@ -170,7 +170,8 @@ def _price(found: Robustness, verdict: Verdict) -> list[tuple[str, str]]:
     if found.probability is not None:
         one = found.probability
         low, high = numbers.percent(one.low, 4), numbers.percent(one.high, 4)
-        told = f"{numbers.percent(one.value, 4)} ({low} to {high}, {one.samples} samples)"
+        samples = numbers.count(one.samples)
+        told = f"{numbers.percent(one.value, 4)} ({low} to {high}, {samples} samples)"
         facts.append(("Every requirement holds with", told))
     if found.price is not None:
         facts.append(("Price of robustness", numbers.in_unit(found.price, found.unit)))

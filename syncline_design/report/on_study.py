@@ -285,12 +285,18 @@ def _figure(brief: Brief, place: int) -> float | None:
 
 
 def _sampled_caption(data: Scatter) -> str:
-    text = (
-        "Computed cases only. A filled mark meets its requirements, the stronger its colour the "
-        "dearer; a cross does not."
-    )
-    others = [short_key(key) for key in data.others]
-    return text + (f" Vary besides: {sentence_list(others)}." if others else "")
+    """What the marks mean; only of those that are there."""
+    told = ["Computed cases only."]
+    costs = {point.cost for point in data.points if point.cost is not None}
+    if any(point.verdict == "meets" for point in data.points):
+        stronger = ", the stronger its colour the dearer" if len(costs) > 1 else ""
+        told.append(f"A filled mark meets its requirements{stronger}.")
+    if any(point.verdict in ("fails", "infeasible") for point in data.points):
+        told.append("A cross does not meet its requirements.")
+    if others := sentence_list([short_key(key) for key in data.others]):
+        shape = ", which the shapes of filled marks tell" if data.kinds else ""
+        told.append(f"What varies besides: {others}{shape}.")
+    return " ".join(told)
 
 
 def _case_table(summary: StudySummary) -> Table:
@@ -317,7 +323,11 @@ def _case_table(summary: StudySummary) -> Table:
     ends = ["Verdict", "Price #", "Syncline error #", "Payload, or why there is none"]
     heads = ["Case #", *varying, *ends]
     more = len(summary.briefs) - MOST_CASES
-    note = f"{more} further cases are in the CSV and Parquet tables." if more > 0 else ""
+    note = (
+        f"{numbers.count(more)} further cases are in the CSV and Parquet tables."
+        if more > 0
+        else ""
+    )
     return table("All cases", heads, rows, note)
 
 

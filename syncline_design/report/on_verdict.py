@@ -317,7 +317,7 @@ def _folded(table: Table) -> list[Node]:
     """A table of the choice, on the page only; a long one is opened when it is asked for."""
     if len(table.rows) <= MOST_OPEN:
         return show(table, reach="page")
-    summary = f"{table.caption} ({len(table.rows)} rows)"
+    summary = f"{table.caption} ({numbers.count(len(table.rows))} rows)"
     return [Group(tuple(show(table)), "fold", summary=summary, reach="page")]
 
 

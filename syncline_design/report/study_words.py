@@ -79,7 +79,8 @@ def _bases(summary: StudySummary) -> str:
     told = []
     for place, base in enumerate(summary.result.study.bases):
         found = [brief.meets for brief in summary.briefs if brief.base == place]
-        many = f"{sum(found) or 'none'} of {len(found)} {'meet' if sum(found) > 1 else 'meets'}"
+        met = numbers.count(sum(found)) if any(found) else "none"
+        many = f"{met} of {numbers.count(len(found))} {'meet' if sum(found) > 1 else 'meets'}"
         told.append(f"{visible(base.name)} ({many})")
     return ", ".join(told)
 
@@ -89,7 +90,9 @@ def _values_of(factor: Factor) -> str:
     shown = [shown_value(factor, label) for label in factor.axis]
     if factor.is_of_figures and len(shown) > MOST_KEYS:
         return f"{shown[0]} to {shown[-1]}"
-    more = f" and {len(shown) - MOST_ACROSS} more" if len(shown) > MOST_ACROSS else ""
+    more = (
+        f" and {numbers.count(len(shown) - MOST_ACROSS)} more" if len(shown) > MOST_ACROSS else ""
+    )
     return ", ".join(shown[:MOST_ACROSS]) + more
 
 
@@ -109,7 +112,7 @@ def count_sentence(result: StudyResult) -> str:
     met, every = numbers.count(counts["meets"]), numbers.count(len(result))
     parts = [f"{met} of {every} cases {verbs['meets'][counts['meets'] != 1]}"]
     if result.waived:
-        parts[0] += f" ({result.waived} with waived ones missed)"
+        parts[0] += f" ({numbers.count(result.waived)} with waived ones missed)"
     others = [(word, n) for word, n in counts.items() if n and word != "meets"]
     parts += [f"{numbers.count(n)} {verbs[word][n > 1]}" for word, n in others]
     return sentence_list(parts)
@@ -181,7 +184,7 @@ def _cell_table(heat: HeatMap) -> Table:
     left = len(heat.x_values) * len(heat.y_values) - len(rows)
     more = max(0, len(rows) - MOST_ROWS)
     note = f"In {left} cells no case meets." if left else ""
-    note += f" {more} further rows are left out." if more else ""
+    note += f" {numbers.count(more)} further rows are left out." if more else ""
     note += f" {cell_notes(heat)}"
     heads = (short_key(heat.y), short_key(heat.x), "Least cost #", "Payload")
     return table(LEAST_COST, heads, rows[:MOST_ROWS], note.strip())
@@ -228,7 +231,7 @@ def winners_table(summary: StudySummary) -> Table:
     rows = [
         [
             Cell(w.role), Cell(w.name), Cell(w.timestamping),
-            Cell(f"{w.cases} of {w.of}", float(w.cases)),
+            Cell(numbers.share_of(w.cases, w.of), float(w.cases)),
             *_where_cells(several, w.where, everywhere=w.cases == w.of),
         ]
         for w in winners(summary, shown_value)
@@ -262,7 +265,7 @@ def misses_table(summary: StudySummary) -> Table:
         row, *others = summary.missed[one.requirement]
         rows.append([
             Cell(one.requirement), Cell(kind_text(row)),
-            Cell(f"{numbers.count(one.cases)} of {numbers.count(len(summary.briefs))}",
+            Cell(numbers.share_of(one.cases, len(summary.briefs)),
                  float(one.cases)),
             Cell(numbers.count(one.waived) if one.waived else "", float(one.waived)),
             Cell("; ".join(filter(None, map(waiver_text, (row, *others))))),
@@ -297,7 +300,7 @@ def boundary_table(summary: StudySummary, most: int = MOST_ROWS) -> Table:
         for end, fixed in list(ends.items())[:most]
     ]
     more = len(ends) - most
-    note = f"{more} further rows are left out." if more > 0 else ""
+    note = f"{numbers.count(more)} further rows are left out." if more > 0 else ""
     heads = ["Along", "Last value that meets", "Next value", "There", "With"]
     return table("Where feasibility ends", heads, rows, note)
 
@@ -306,4 +309,4 @@ def _with_words(fixed: list[str]) -> str:
     """The combinations that share an end: up to three by name, of more the ends and the number."""
     if len(fixed) <= 3:
         return " | ".join(fixed)
-    return f"{len(fixed)} combinations, {fixed[0]} to {fixed[-1]}"
+    return f"{numbers.count(len(fixed))} combinations, {fixed[0]} to {fixed[-1]}"
