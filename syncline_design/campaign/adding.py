@@ -9,6 +9,7 @@ from pathlib import Path
 from syncline_design import __version__
 from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_of
 from syncline_design.diagnosis.consequence import SpecPromise
+from syncline_design.diagnosis.one_of_several import rivals_words
 from syncline_design.diagnosis.result import Finding
 from syncline_design.diagnosis.run import SearchedLog, examined, weigh
 from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
@@ -16,6 +17,7 @@ from syncline_design.diagnosis.sufficient import sufficient
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
 from syncline_design.machine.input_files import content_of
+from syncline_design.machine.sentences import or_rivals
 from syncline_design.spec.case import Case
 
 
@@ -76,4 +78,5 @@ def kept(one: SearchedLog, digest: str, promise: SpecPromise | None) -> Run:
 def _named(one: Finding) -> NamedAlone:
     effect = registry().get(one.effect)
     undone = effect is not None and effect.undoing is not None
-    return NamedAlone(one.effect, one.sensor, one.stage, one.sentence, undone)
+    words = one.sentence + or_rivals([rivals] if (rivals := rivals_words(one)) else [])
+    return NamedAlone(one.effect, one.sensor, one.stage, words, undone)

@@ -162,7 +162,8 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
         (aliases, (), ()), material, size_m,
     )  # fmt: skip
     tested = one.tested.logs if one.tested.starts is None else one.tested.starts
-    found = replace(found, scope=scope, one_value=tested)
+    found = replace(found, scope=scope, one_value=tested,
+                    probability=1.0 / total if aliases else None)  # fmt: skip
     if scope == "build":
         return replace(found, each_log=logs)
     texts = {name: _ends_text([log.parameters[name] for log in logs]) for name in shown}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 
 from syncline_design.choice.effect_tables import NoBudget
 from syncline_design.choice.outcome import Explanation
 from syncline_design.choice.problem import build_problem
 from syncline_design.comparison.repairs import Repair
+from syncline_design.diagnosis.one_of_several import is_one_of_several, members, rivals_words
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
@@ -103,7 +104,21 @@ def with_design(
 ) -> DiagnosisAndDesign:
     """The diagnosis with what it means for the design, and what would put that right."""
     parts = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
+    if means is not None:
+        means = replace(means, text=(*means.text, *_class_lines(found)))
     return DiagnosisAndDesign(**parts, design=means, repairs=repairs)
+
+
+def _class_lines(found: Diagnosis) -> Iterator[str]:
+    """Of what is one of several that the log cannot tell apart: as which of them it is charged."""
+    who = "this log" if found.joint is None else "these logs"
+    for one in found.findings:
+        if is_one_of_several(one) and one.material and one.kind == "cause" and one.fits_a_spec:
+            first = members(one)[0]
+            yield (
+                f"Charged is {first}; with {rivals_words(one)}, which {who} cannot tell from it, "
+                "the figures may be others."
+            )
 
 
 def meaning(case: Case, entries: Sequence[EffectChoice], seed: int) -> DesignMeaning | None:

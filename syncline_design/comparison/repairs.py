@@ -18,6 +18,7 @@ from syncline_design.comparison.repair_options import (
     compatible,
     remedies,
 )
+from syncline_design.diagnosis.one_of_several import is_one_of_several, members
 from syncline_design.diagnosis.result import Finding
 from syncline_design.effects.acting import known_of
 from syncline_design.machine.deadline import in_force
@@ -151,10 +152,18 @@ def _repair(whole: Case, one: _Scored, seed: int) -> Repair:
     verdict = check_loaded(applied(whole, chosen), CheckSettings(seed=seed, monte_carlo=simulated))
     misses = tuple(row.id for row in verdict.requirements if row.status != "pass")
     steps = tuple(
-        RepairStep(r.kind, r.finding.effect, r.finding.sensor, r.finding.stage, r.text, r.assumes)
+        RepairStep(r.kind, r.finding.effect, r.finding.sensor, r.finding.stage, r.text, _assumed(r))
         for r in chosen
     )
     return Repair(
         one.price, whole.spec.currency, one.error_m, verdict.verdict, misses, steps,
         cheapest=False, beaten=False,
     )  # fmt: skip
+
+
+def _assumed(one: Remedy) -> str:
+    """What has to be so; of one of several effects that a log leaves, that it is that one."""
+    if not is_one_of_several(one.finding) or one.kind == "nothing":
+        return one.assumes
+    named = f"it is indeed {members(one.finding)[0]}"
+    return f"{one.assumes}; {named}" if one.assumes else named

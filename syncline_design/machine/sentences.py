@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Final
+
+MOST_NAMED: Final = 3  # members of a class that a headline names
 
 
 def sentence_list(items: list[str], last: str = "and") -> str:
@@ -15,6 +18,15 @@ def sentence_list(items: list[str], last: str = "and") -> str:
 def one_of(known: Sequence[str]) -> str:
     """What is expected where these are known: `one of a, b`, or the only one."""
     return f"one of {', '.join(known)}" if len(known) > 1 else known[0]
+
+
+def any_of(names: Sequence[str], most: int = MOST_NAMED) -> str:
+    """`a`, `a or b`, `a, b or one of 3 others`: which it may be, the first few by name."""
+    more = len(names) - most
+    if more <= 0:
+        return sentence_list(list(names), "or")
+    rest = "another one" if more == 1 else f"one of {more} others"
+    return sentence_list([*names[:most], rest], "or")
 
 
 def or_rivals(names: Iterable[str]) -> str:

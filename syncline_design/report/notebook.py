@@ -53,12 +53,16 @@ def shown(result: object) -> str | None:
 
 def on_finding(found: Finding) -> Document:
     """One finding of a diagnosis by itself."""
-    from syncline_design.report.on_findings import finding_node
+    from syncline_design.diagnosis.one_of_several import class_words, is_one_of_several
+    from syncline_design.report.on_findings import finding_node, headline
 
-    outcome = Outcome("warn", "!", found.effect.replace("_", " "))
+    several = is_one_of_several(found)
+    named = class_words(found) if several else found.effect.replace("_", " ")
+    said = headline(found) if several else found.sentence
+    outcome = Outcome("warn", "!", named)
     name = f"{found.sensor}, {found.stage}"
     nodes = section("finding", "What is known of it", [finding_node(found)])
-    return Document("Finding", outcome, name, (found.sentence,), (), tuple(nodes))
+    return Document("Finding", outcome, name, (said,), (), tuple(nodes))
 
 
 def on_optimization(result: Optimization) -> Document:

@@ -8,6 +8,7 @@ from typing import Final
 
 from syncline_design.comparison.meaning import DesignMeaning, DiagnosisAndDesign
 from syncline_design.diagnosis.gap_result import Gap
+from syncline_design.diagnosis.one_of_several import is_one_of_several
 from syncline_design.diagnosis.result import (
     Diagnosis,
     LogRead,
@@ -32,9 +33,9 @@ from syncline_design.report.document import (
     show,
 )
 from syncline_design.report.on_findings import (
-    called,
     finding_nodes,
     full_stop,
+    headline,
     left_text,
     noise_lines,
     regime_text,
@@ -66,6 +67,9 @@ _UNSOUND: Final = Outcome(
 )
 _CONSTANT: Final = Outcome(
     "warn", "!", "Explained, or within the spec: constant noise of its size would do the same"
+)
+_CLASS: Final = (
+    "Explained{part} by one of several effects that {who} cannot tell apart; what remains is noise"
 )
 LARGE: Final = 1.25  # times the RMS that the spec's noise expects: said in the outcome
 MOST_REGIMES: Final = 4  # told outside the page
@@ -151,6 +155,8 @@ def outcome_of(found: Diagnosis) -> Outcome:
     known, times = DIAGNOSES[found.verdict], _times_expected(found.gap)
     if _maybe_constant(found):
         known = _CONSTANT
+    elif found.verdict == "explained":
+        known = _up_to_a_class(found, known)
     if _maybe_slow(found):
         return Outcome(
             "warn",
@@ -162,6 +168,17 @@ def outcome_of(found: Diagnosis) -> Outcome:
         return known
     more = f"{known.word}, {numbers.number(times, 2)} times what the spec expects"
     return Outcome(known.tone, known.mark, more)
+
+
+def _up_to_a_class(found: Diagnosis, known: Outcome) -> Outcome:
+    """The outcome; where a cause is one of several that the log leaves, that it is."""
+    causes = [one for one in found.findings if one.material and one.kind == "cause"]
+    classes = [one for one in causes if is_one_of_several(one)]
+    if not classes:
+        return known
+    part = ", in part" if len(classes) < len(causes) else ""
+    who = "this log" if found.joint is None else "these logs"
+    return Outcome(known.tone, known.mark, _CLASS.format(part=part, who=who))
 
 
 def _maybe_constant(found: Diagnosis) -> bool:
@@ -202,7 +219,7 @@ def sentence_text(found: Diagnosis) -> str:
 def _found_text(found: Diagnosis) -> str:
     """What is sure, then the noise, then what is left."""
     named = [one for one in found.findings if one.material and one.kind != "noise"]
-    said = [full_stop(called(one)) for one in named]
+    said = [headline(one) for one in named]
     said += [full_stop(line) for line in noise_lines(found.findings)]
     if not said and not found.remaining.material:
         slow = _maybe_slow(found)

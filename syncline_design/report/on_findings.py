@@ -7,6 +7,12 @@ from typing import Final
 
 from syncline_design.diagnosis.gap_result import Regime, Remaining
 from syncline_design.diagnosis.identify import SAME
+from syncline_design.diagnosis.one_of_several import (
+    class_words,
+    is_one_of_several,
+    members,
+    rivals_words,
+)
 from syncline_design.diagnosis.result import (
     Diagnosis,
     Estimate,
@@ -47,6 +53,23 @@ def called(one: Finding) -> str:
     if one.within_noise is not None:
         text = f"{text}; constant noise of {one.within_noise.sensor} would do the same"
     return text if one.kind == "cause" else f"Not as a cause, as the nearest word for it: {text}"
+
+
+def headline(one: Finding) -> str:
+    """The sentence of a finding; of one of several that its log cannot tell apart, that first."""
+    if not is_one_of_several(one):
+        return full_stop(called(one))
+    if one.kind != "cause":
+        return f"{called(one).rstrip('.')}; as well: {rivals_words(one)}."
+    every = members(one)
+    who = "this log" if one.scope is None else "these logs"
+    chance = ""
+    if one.probability is not None:
+        chance = f", probability {numbers.number(one.probability, 2)}"
+    return (
+        f"One of {len(every)} effects that {who} cannot tell apart: {class_words(one)}. "
+        f"If it is {every[0]}{chance}: {full_stop(called(one))}"
+    )
 
 
 def noise_lines(findings: Sequence[Finding]) -> list[str]:

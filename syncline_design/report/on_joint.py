@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
+from syncline_design.diagnosis.one_of_several import names_of
 from syncline_design.diagnosis.result import Estimate, Finding, Joint, LogAlone, UnlikeOthers
-from syncline_design.machine.sentences import sentence_list
+from syncline_design.machine.sentences import any_of, sentence_list
 from syncline_design.model.figure_text import format_chance, format_components, format_estimates
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import charts_watch as drawings
@@ -101,10 +102,11 @@ def unlike_words(one: UnlikeOthers) -> str:
             if own.seen and not isinstance(own.value, str)}  # fmt: skip
     parts = [f"{split_suffix(name)[0].replace('_', ' ')} by {text}"
              for name, text in format_components(seen).items()]  # fmt: skip
-    what = f"{one.effect.replace('_', ' ')} ({one.sensor})"
+    every = names_of(one, list(one.aliases or ()))
+    first = f"as {every[0]}, " if len(every) > 1 else ""
     return (
-        f"log {one.number} ({', '.join(one.files)}) is unlike the others: {what} differs there, "
-        f"{sentence_list(parts)}; noise alone does that with a chance of "
+        f"log {one.number} ({', '.join(one.files)}) is unlike the others: {any_of(every)} differs "
+        f"there, {first}{sentence_list(parts)}; noise alone does that with a chance of "
         f"{format_chance(one.log10_chance)}, all logs and effects counted. What is said here is "
         "what the others say together"
     )

@@ -10,7 +10,7 @@ from syncline_design.campaign.watch_result import Alarm, Unsettled, Watch, Watch
 from syncline_design.diagnosis.result import BlindSpot, Other, UnlikeOthers
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
-from syncline_design.machine.sentences import sentence_list
+from syncline_design.machine.sentences import any_of, sentence_list
 from syncline_design.model.figure_text import format_interval, format_quantity
 from syncline_design.model.quantity import split_suffix, suffix_unit
 from syncline_design.report import charts_watch as drawings
@@ -99,7 +99,7 @@ def _outcome(found: Watch) -> Outcome:
     own = [one for one in found.unlike or () if one.number == first.since.run]
     beyond = first.since.run in [run.run for run in found.contradicted]
     if first.alone or len(own) > 1 or (own and beyond):
-        names = sentence_list([_name(one, found) for one in own[:MOST_NAMED]])
+        names = sentence_list([_names(one, found) for one in own[:MOST_NAMED]])
         more = f" and {len(own) - MOST_NAMED} more" if len(own) > MOST_NAMED else ""
         also = f"{_contradiction(found, first.since.run)} and " if beyond else ""
         words = f"Run {first.since.run} {also}is unlike the others: {names}{more}"
@@ -107,7 +107,7 @@ def _outcome(found: Watch) -> Outcome:
     when = first.since.date or f"run {first.since.run}"
     drifts = first.drift is not None and not first.drift.ended
     what = "Drifts" if drifts else "Changed"
-    return Outcome("bad", "!", f"{what}: {_name(first, found)}, since {when}")
+    return Outcome("bad", "!", f"{what}: {_names(first, found)}, since {when}")
 
 
 def _odd_one(found: Watch) -> str:
@@ -138,6 +138,11 @@ def _name(one: Alarm | BlindSpot | UnlikeOthers | Unsettled | Other, found: Watc
     stage = getattr(one, "stage", None) if len(stages) > 1 else None
     place = f"{one.sensor}, {stage}" if stage else one.sensor
     return f"{one.effect.replace('_', ' ')} ({place})"
+
+
+def _names(one: Alarm | UnlikeOthers, found: Watch) -> str:
+    """The same with what the runs cannot tell it from: `latency (position) or lever arm (..)`."""
+    return any_of([_name(each, found) for each in (one, *(one.aliases or ()))])
 
 
 def _sentences(found: Watch) -> Iterator[Inline]:
@@ -196,8 +201,10 @@ def _sentence(one: Alarm, found: Watch) -> str:
     place = f"run {one.since.run} ({one.since.file}{dated})"
     if one.words is not None:
         return f"Since {place}: {one.words}."
-    name = _name(one, found)
+    name = _names(one, found)
     name = name[0].upper() + name[1:]
+    if one.aliases:
+        name += f" (these runs cannot tell). As {_name(one, found)}"
     if one.alone:
         return f"{name}: {_parameter(one)} differs by {one.text} in {place} alone."
     near = ""
