@@ -201,6 +201,8 @@ def scatter(source: np.random.Generator, time_s: Array, width: int, kind: str) -
     white = source.normal(size=(count, width))
     if kind == "slow":
         return 0.8 * white + 0.6 * _walk(source, time_s, width, 25.0)
+    if kind == "quick":
+        return math.sqrt(0.5) * (white + _walk(source, time_s, width, 5.0))
     if kind == "tails":
         return np.asarray(source.standard_t(5.0, (count, width)) / math.sqrt(5.0 / 3.0))
     if kind == "uneven":

@@ -1,15 +1,13 @@
 """How much noise each sensor has, with an interval that counts what they can be taken for.
 
-With S_i = F_i + sum_a t_a C_ai the covariance of row i, t_a the variance over the spec's of some
-readings of a sensor,
+The sizes of noise are those of the likelihood of the series in time (`noise_in_time`).  What is
+asked beside them of rows alone is split by directions: with S_i = F_i + sum_a t_a C_ai the
+covariance of row i, t_a the variance over the spec's of some readings of a sensor,
     I_ab = tr(S^-1 C_a S^-1 C_b) / 2,   g_a = e' S^-1 C_a S^-1 e / 2 - tr(S^-1 C_a S^-1 F) / 2,
 summed over the rows, t = I^-1 g, again until it rests (Fisher scoring of normal variance
 components).  Its covariance is that of leaving out one of sixteen stretches after the other, so
 tails count, and at least I^-1, which normal noise leaves at best: sixteen stretches that happen to
-agree are no proof where sensors are hardly told apart.  Beside it counts what the fitted slow noise
-makes of so long a mean square.  Ranges and
-bearings are two devices in one sensor and have a t each, and so have readings that were found
-unlike.
+agree are no proof where sensors are hardly told apart.
 Source: Searle, Casella, McCulloch, Variance Components (1992), ch. 6.
 """
 
@@ -23,8 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.fitting import Data, Model
-from syncline_design.diagnosis.noise import SensorKey, White, as_specified, white_covariance
-from syncline_design.diagnosis.unlike_readings import READINGS, Unlike, slopes_of_readings
+from syncline_design.diagnosis.noise import SensorKey, as_specified, white_covariance
+from syncline_design.diagnosis.noise_in_time import sizes_in_time
+from syncline_design.diagnosis.noise_parts import NoisePart, noise_parts
+from syncline_design.diagnosis.unlike_readings import READINGS, Unlike
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import student_limit
@@ -81,29 +81,16 @@ class NoiseFactors:
         return math.sqrt(sum(known) + max(more))
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """Readings of one sensor with one factor, and what they scatter by the spec (n, 3, 3) [m2]."""
-
-    sensor: SensorKey
-    readings: tuple[int, ...]
-    covariance: Array
-
-
 def factors(data: Data, model: Model, unlike: Sequence[Unlike] = ()) -> Mapping[str, NoiseFactors]:
     """Of every sensor that the log's error is made of, by `stage/sensor`."""
-    split = _parts(data, unlike)
+    split = noise_parts(data, unlike)
     if len(data.view) < LEAST_ROWS or not split or not data.axes:
         return {}
-    error = np.nan_to_num(model.error)[:, list(data.axes)]
-    _, parts, fixed = components(data, unlike)
-    values, spread = estimated(error, parts, fixed)
-    slow = np.array([_of_slow(data, model, one) for one in split])
-    reach = np.hypot(spread, NORMAL_95 * slow)
     found: dict[SensorKey, list[tuple[NoiseFactor, float]]] = {}
-    for one, v, r in zip(split, values, reach, strict=True):
+    for one, size in zip(split, sizes_in_time(data, model, split), strict=True):
         names = tuple(READINGS[one.sensor[1]][k] for k in one.readings)
-        factor = NoiseFactor(_root(v), _root(v - r), _root(v + r), names if len(names) < 3 else ())
+        value, low, high = (math.sqrt(v) for v in (size.value, size.low, size.high))
+        factor = NoiseFactor(value, low, high, names if len(names) < 3 else ())
         found.setdefault(one.sensor, []).append((factor, _share(data, one)))
     return {"/".join(key): _loudest_first(own, _sigma(data, key)) for key, own in found.items()}
 
@@ -121,14 +108,14 @@ def stated_m(data: Data) -> Mapping[str, float]:
 
 def components(data: Data, unlike: Sequence[Unlike]) -> tuple[tuple[SensorKey, ...], Array, Array]:
     """Sensors of the readings that have a factor, C_a (m, n, k, k) of each and F (n, k, k) [m2]."""
-    split, axes = _parts(data, unlike), list(data.axes)
+    split, axes = noise_parts(data, unlike), list(data.axes)
     parts = np.stack([_on(one.covariance, axes) for one in split])
     whole = white_covariance(data.structure, as_specified(data.structure))
     return tuple(one.sensor for one in split), parts, _on(whole, axes) - parts.sum(0)
 
 
 def estimated(error: Array, parts: Array, fixed: Array) -> tuple[Array, Array]:
-    """t of every part, and half of its 95 % interval without slow noise, (m,).
+    """t of every part, and half of its 95 % interval in noise that is white, (m,).
 
     error (n, k), parts (m, n, k, k), fixed (n, k, k).
     """
@@ -147,26 +134,6 @@ def estimated(error: Array, parts: Array, fixed: Array) -> tuple[Array, Array]:
     return values, np.maximum(by_stretch, NORMAL_95 * at_best)
 
 
-def _of_slow(data: Data, model: Model, one: _Part) -> float:
-    """Standard deviation of a log's mean square, over the spec's, that slow noise makes of it.
-
-    A mean over D of the square of Gauss-Markov noise of variance v and time constant T has the
-    variance 2 v^2 T / D; stretches shorter than T vary together and say less of it.
-    """
-    keys = [part.sensor for part in data.structure.slow]
-    if one.sensor not in keys:
-        return 0.0
-    at = keys.index(one.sensor)
-    white = [w.sensor for w in data.structure.white].index(one.sensor)
-    scale2 = max(model.level.factor[white], 1.0) ** 2
-    time_s = data.structure.time_s
-    span_s = max(float(time_s[-1] - time_s[0]), 1e-9)
-    both = zip(model.level.slow[at], model.level.time_constant_s[at], strict=True)
-    parts = [2.0 * (scale2 * v) ** 2 * min(constant_s / span_s, 1.0) for v, constant_s in both]
-    own = [parts[k] for k in one.readings]
-    return math.sqrt(sum(own)) / len(own)
-
-
 def _sigma(data: Data, key: SensorKey) -> tuple[float, ...]:
     stage = next(s for s in data.view.system.stages if s.name == key[0])
     return tuple(float(s) for s in getattr(stage, key[1]).sigma)
@@ -182,7 +149,7 @@ def _loudest_first(
     )
 
 
-def _share(data: Data, one: _Part) -> float:
+def _share(data: Data, one: NoisePart) -> float:
     """Variance [m2] that readings add to a target at the platform's distance, by the spec."""
     stage = next(s for s in data.view.system.stages if s.name == one.sensor[0])
     distance_m, sigma = stage.platform.distance_m, _sigma(data, one.sensor)
@@ -191,39 +158,9 @@ def _share(data: Data, one: _Part) -> float:
     return float(sum((sigma[k] * arms[k]) ** 2 for k in one.readings))
 
 
-def _parts(data: Data, unlike: Sequence[Unlike]) -> list[_Part]:
-    grown = {one.sensor: one.growth for one in unlike}
-    slopes = slopes_of_readings(data)
-    found: list[_Part] = []
-    for white in data.structure.white:
-        groups = _groups(white, grown.get(white.sensor, (1.0,) * 3))
-        if len(groups) == 1:
-            found.append(_Part(white.sensor, groups[0], white.covariance))
-            continue
-        own = [slopes[white.sensor][:, :, list(group)] for group in groups]
-        squares = [each @ np.swapaxes(each, 1, 2) for each in own]
-        traces = np.sum([np.einsum("nii->n", each) for each in squares], axis=0)
-        scale = np.einsum("nii->n", white.covariance) / np.maximum(traces, 1e-300)
-        found += [_Part(white.sensor, group, scale[:, None, None] * each)
-                  for group, each in zip(groups, squares, strict=True)]  # fmt: skip
-    return found
-
-
-def _groups(white: White, growth: tuple[float, ...]) -> list[tuple[int, ...]]:
-    """Readings that have one factor: ranges and bearings apart, and what was found unlike."""
-    of: dict[tuple[bool, float], list[int]] = {}
-    for k, own in enumerate(growth):
-        of.setdefault((white.loading is None and k == 0, own), []).append(k)
-    return [tuple(group) for group in of.values()]
-
-
 def _on(covariance: Array, axes: Sequence[int]) -> Array:
     found: Array = covariance[:, axes][:, :, axes]
     return found
-
-
-def _root(share: float) -> float:
-    return math.sqrt(max(float(share), 0.0))
 
 
 def _sums(
