@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.diagnosis.frozen import Frozen
+from syncline_design.diagnosis.gross import gross_faults
 from syncline_design.diagnosis.hanging import hanging, hanging_checks, what_hangs
 from syncline_design.diagnosis.mending import without_rows
 from syncline_design.diagnosis.result import Check
@@ -38,9 +39,12 @@ class Hanging:
     size_m: float = 0.0
 
 
-def without_hanging(inputs: Measured) -> tuple[Measured, Hanging]:
-    """The log without the rows in which a device hangs, counted among those that are left out."""
-    found = hanging(inputs)
+def without_hanging(inputs: Measured, exclude: Sequence[str] = ()) -> tuple[Measured, Hanging]:
+    """The log without the rows in which a device hangs, counted among those that are left out.
+
+    exclude: effects that no fault is laid on.
+    """
+    found = _hanging(inputs, exclude)
     if not found:
         return inputs, Hanging()
     log = _without(inputs, found)
@@ -53,11 +57,33 @@ def without_hanging(inputs: Measured) -> tuple[Measured, Hanging]:
     def reread(seconds: float) -> Log:
         assert read is not None
         again = replace(inputs, log=read(seconds))
-        return _without(again, hanging(again))
+        return _without(again, _hanging(again, exclude))
 
     less = replace(inputs, log=log, reread=None if read is None else reread)
     squares = sum(float(np.sum(one.off_m**2)) for one in found)
     return less, Hanging(found, checks, left_out, math.sqrt(squares / len(inputs.log)))
+
+
+def _hanging(inputs: Measured, exclude: Sequence[str]) -> tuple[Frozen, ...]:
+    """Runs in which a device hangs whatever is grossly wrong with all of the log.
+
+    Columns in a unit in which they hardly move (radians for degrees) rest all of the time; in
+    their own they follow the course, and what hangs does not.
+    """
+    found = hanging(inputs)
+    if not found:
+        return ()
+    faults, log = gross_faults(inputs.system, inputs.log, inputs.known, exclude, inputs.reread)
+    if not faults:
+        return found
+    undone = hanging(replace(inputs, log=log))
+
+    def meets(one: Frozen, other: Frozen) -> bool:
+        own, its = inputs.log.time_s, log.time_s
+        within = own[one.first] <= its[other.last] and its[other.first] <= own[one.last]
+        return (one.stage, one.sensor) == (other.stage, other.sensor) and bool(within)
+
+    return tuple(one for one in found if any(meets(one, other) for other in undone))
 
 
 def _without(inputs: Measured, found: Sequence[Frozen]) -> Log:

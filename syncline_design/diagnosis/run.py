@@ -155,7 +155,7 @@ def examined(
 ) -> SearchedLog:
     """Leave out what is no reading of its time, undo what is grossly wrong with a log, and look for
     what is missing."""
-    less, hanging = without_hanging(inputs)
+    less, hanging = without_hanging(inputs, settings.exclude_effects)
     return replace(_examined(less, settings, progress), hanging=hanging)
 
 
