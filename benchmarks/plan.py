@@ -129,12 +129,17 @@ def scenario_of(run: PlanRun, platform: str, system: System, seed: int) -> Scena
     )  # fmt: skip
 
 
-def drawn(run: PlanRun, effect: str, rng: np.random.Generator) -> Hidden:
+def drawn(
+    run: PlanRun,
+    effect: str,
+    rng: np.random.Generator,
+    strong: tuple[float, float] = STRONG,
+) -> Hidden:
     """An effect with every parameter some predicted sigmas large."""
     one = named(effect, "")
     sigma = run.result.after[-1].sigma
     values = {
-        key.rpartition(".")[2]: float(rng.choice([-1.0, 1.0]) * rng.uniform(*STRONG) * s)
+        key.rpartition(".")[2]: float(rng.choice([-1.0, 1.0]) * rng.uniform(*strong) * s)
         for key, s in sigma.items()
         if key.startswith(f"{effect}.") and math.isfinite(s)
     }

@@ -124,7 +124,7 @@ def in_a_part(
     levels: noise to look for its ends in; what is fitted while it is missing has swallowed it.
     """
     asked = [s for s in free if s.candidate.effect.passing and cuttable(s.candidate.effect)]
-    if states.count < BLOCKS or not asked:
+    if not states.has_parts or not asked:
         return []
     found = []
     columns = [np.nan_to_num(one.columns) for one in asked]
@@ -155,7 +155,7 @@ def in_a_part_of_white(
     Slow courses take the shape of whatever begins and ends: here they are not there at all.
     """
     asked = [s for s in free if s.candidate.effect.passing and cuttable(s.candidate.effect)]
-    if states.count < BLOCKS or not asked:
+    if not states.has_parts or not asked:
         return []
     columns = [np.nan_to_num(one.columns) for one in asked]
     blocks = blocks_of(states, model, columns)
@@ -194,7 +194,7 @@ def _judged(
 
 def cut_down(states: States, model: Model) -> Model:
     """The model with every effect that shows no sign of itself outside a stretch cut to that."""
-    if states.count < BLOCKS:
+    if not states.has_parts:
         return model
     blocks: PartSums | None = None
     for label in [a.label for a in model.acting]:

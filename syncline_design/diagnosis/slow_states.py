@@ -40,7 +40,9 @@ WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
 INSIDE = 12  # blocks of a part of the log in which an effect acts alone
 FEW = 8, 64  # targets, to be left out one group after the other
-LEAST_ROWS = 8  # of a block
+LEAST_ROWS = 8  # of a block of a part of the log, and of one that is told by itself
+FEWEST_ROWS = 4  # of a block that is left out: of fewer blocks hardly more than the values of an
+# effect, as in a short drive, Fisher's F tells next to nothing, whatever their size
 HUBER = 1.345  # standard deviations from where on a component counts less
 REWEIGHTED = 3
 MATTERS = 1e-3  # of a row's white standard deviation: channels below have no say
@@ -69,6 +71,11 @@ class States:
     @property
     def count(self) -> int:
         return int(self.block[-1]) + 1
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether it is long enough for its blocks to be told by themselves."""
+        return len(self.block) >= BLOCKS * LEAST_ROWS
 
     def judged(
         self, model: Model, groups: Sequence[Array], own: Array | None = None
@@ -133,7 +140,7 @@ class States:
         """
         columns = np.nan_to_num(slopes(self.data.view, model.acting))
         width = columns.shape[2]
-        if self.count < BLOCKS or width == 0:
+        if not self.has_parts or width == 0:
             return [None for _ in model.acting]
         sums = self._weighted(model.level, model.error, columns)
         normal, score = sums.sums(self.block)
@@ -309,7 +316,7 @@ def slow_states(data: Data) -> States:
         channel += [len(roles)] * courses[-1].shape[2]
         wave += [1] * courses[-1].shape[2]
         roles.append((SURVEY, 0))
-    count = int(np.clip(len(view) // LEAST_ROWS, 1, BLOCKS))
+    count = int(np.clip(len(view) // FEWEST_ROWS, 1, BLOCKS))
     block = np.minimum(np.arange(len(view)) * count // max(len(view), 1), count - 1)
     whole = np.concatenate(courses, axis=2) if courses else np.zeros((len(view), 3, 0))
     channels_of, waves_of = np.array(channel, int), np.array(wave, int)
