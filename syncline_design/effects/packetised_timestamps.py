@@ -48,7 +48,8 @@ EFFECT = Effect(
     sensors=("position", "attitude"),
     kind="stochastic",
     parameters=(Parameter("interval_s", 1e-4, 1.0, "s", signed=False),),
-    sentence="{sensor} data are stamped in packets of {interval_s}",
+    sentence="{sensor} data are older than their stamps by 0 to {interval_s}, evenly spread: they "
+    "wait for a packet, or for a busy host",
     confused_with="latency together with timestamp_jitter",
     separated_by="the scatter of the stamps: 0.577 of their mean age",
     source="uniform distribution on [0, D]: mean D/2, variance D^2/12",
