@@ -34,6 +34,7 @@ from syncline_design.machine.input_files import ContentsBeside, FileRead, note_r
 from syncline_design.model.figure_text import percent
 from syncline_design.spec.load import BadInput
 
+_TOLD: Final = 2.0  # times the bound, from which what the stamps leave a rhythm by is told
 _TURN: Final = 1.3  # grains that a clock may run on by until a grid's edge shows
 
 
@@ -241,6 +242,10 @@ def _cannot_show(one: Examined, two: TwoTimes) -> tuple[str, ...]:
         said.append("its constant latency, nor how far its clock is from the recorder's")
     if one.hidden is not None:
         said.append(f"{one.hidden.words}; the bound counts {in_words(one.hidden.seconds)} for it")
+    elif (far_s := _unlike_a_rhythm(one, two)) > 0.0:
+        said.append(f"whether stamps are late here and there, or wander, with their receipts: they "
+                    f"lie over {in_words(far_s)} about an even rhythm, as such stamps do and those "
+                    "of an uneven sensor; the bound counts nothing of it")  # fmt: skip
     grain_s = cut_to_one_interval(one.whole, one.pace)
     drifts = [abs(float(f.parameters["ppm"])) for f in one.faults if f.fault == "drift"]
     if drifts and 1e-6 * max(drifts) * float(np.ptp(one.series.seconds)) < _TURN * grain_s:
@@ -268,6 +273,14 @@ def _cannot_show(one: Examined, two: TwoTimes) -> tuple[str, ...]:
     if one.smallest.step_s is None:
         said.append("steps and drift: too few messages")
     return tuple(said)
+
+
+def _unlike_a_rhythm(one: Examined, two: TwoTimes) -> float:
+    """Reach [s] of sound stamps about an even rhythm where it is well beyond the bound, else 0."""
+    bound_s = one.residual.bound
+    if two.uneven_s is None or bound_s is None or any(f.counts for f in one.faults):
+        return 0.0
+    return two.uneven_s if two.uneven_s > _TOLD * bound_s else 0.0
 
 
 def _why_one_time(stream: Stream) -> str:
