@@ -124,6 +124,17 @@ def test_a_front_that_was_asked_for_is_drawn_and_comes_first() -> None:
     assert "Best designs" in plain
 
 
+def test_a_design_of_a_front_is_drawn_with_its_price_its_error_and_its_payload() -> None:
+    found = sd.optimize(ROOT / "specs" / "uav_corridor.yaml", pareto=True)
+    for one in (found.front[0], found.designs[0]):
+        said = Words(one._repr_html_() or "").text
+        assert f"{one.cost:,.0f}".replace(",", "\N{NO-BREAK SPACE}") in said.replace(" ", "\xa0")
+        assert f"{1000 * one.error_m:.4g}" in said
+        for stage in one.design.stages:
+            for entry in stage.roles.values():
+                assert entry.name in said
+
+
 def test_what_a_user_wrote_stays_text(tmp_path: Path) -> None:
     text = (ROOT / "specs" / "position_track.yaml").read_text(encoding="utf-8")
     spec = tmp_path / "own.yaml"

@@ -32,6 +32,8 @@ from syncline_design.planning.setup import PlanRequest, Setup
 from syncline_design.planning.standard import MOST_LEGS, Lines, most_within
 from syncline_design.planning.telling import PlanRun
 from syncline_design.planning.wanted import PlanWanted, reach_of
+from syncline_design.report.document import TableNode
+from syncline_design.report.on_plan import on_plan
 from syncline_design.report.plans import render_plan
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
@@ -327,6 +329,35 @@ def test_a_drive_is_the_same_where_no_line_plans_are_judged_beside_it(
     assert not alone.result.standard
     assert alone.result.after == run.result.after
     assert alone.result.legs == run.result.legs
+
+
+@pytest.mark.parametrize(
+    ("seconds", "unit"),
+    [((9.3, 115_200.0, 24_540.0), "min"), ((9.3, 30.0, 2.5), "s"), ((36_000.0, 90_000.0), "h"),
+     ((61.0, None, 36_000.0), "min")],
+)  # fmt: skip
+def test_drives_beside_one_another_last_so_many_of_one_unit(
+    run: PlanRun, seconds: tuple[float | None, ...], unit: str
+) -> None:
+    """Read back from the page's table: what was put in, to what two digits or a whole tell."""
+    first, *others = seconds
+    known = run.result.standard[0]
+    lines = [replace(known, minutes=None if s is None else s / 60.0) for s in others]
+    assert first is not None
+    result = replace(run.result, duration_s=first, standard=tuple(lines))
+    parts = on_plan(replace(run, result=result)).sections
+    tables = [node.table for part in parts for node in part.nodes if isinstance(node, TableNode)]
+    shown = next(one for one in tables if "standard line plans" in one.caption)
+    cells = next(row[1:] for row in shown.rows if row[0].text == "Until reached")  # turned
+    told = [cell.text.replace("\N{NO-BREAK SPACE}", " ") for cell in cells]
+    size = {"s": 1.0, "min": 60.0, "h": 3600.0}[unit]
+    for words, wanted in zip(told, seconds, strict=True):
+        if wanted is None:
+            assert words.startswith("never")
+            continue
+        figure, _, own = words.rpartition(" ")
+        assert own == unit
+        assert float(figure.replace(" ", "")) * size == pytest.approx(wanted, rel=0.06)
 
 
 def test_no_line_plan_that_tells_as_much_is_much_shorter(run: PlanRun, pair: PlanRun) -> None:

@@ -8,6 +8,7 @@ import io
 import json
 import re
 import time
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,9 +22,10 @@ from study_specs import SPEC, STUDY, write
 from syncline_design.machine.records import read_as, schema_of
 from syncline_design.report.on_study import on_study
 from syncline_design.report.progress_line import ProgressLine, StepLine, busy, progress_text
-from syncline_design.report.render_console import console, table_lines
+from syncline_design.report.render_console import console, paragraph, table_lines
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.report.studies import STUDY_FORMATS, render_study
+from syncline_design.report.study_words import stored_text
 from syncline_design.report.table import table
 from syncline_design.studies import Progress, StudyResult, StudySettings, run_study
 from syncline_design.studies.data import StudyData, study_data
@@ -213,9 +215,24 @@ def test_hostile_names_stay_text(tmp_path: Path, hostile: str) -> None:
 def test_progress_says_what_is_left() -> None:
     assert progress_text(Progress(0, 10, 0, 0.0)) == "0 of 10 cases, estimating"
     assert progress_text(Progress(6, 10, 2, 80.0)) == "6 of 10 cases, 2 already there, 01:20 left"
-    assert progress_text(Progress(5, 9999, 0, 9.0)) == "5 of 9999 cases, estimating"  # 5 h
+    assert progress_text(Progress(5, 9999, 0, 9.0)) == "5 of 9 999 cases, estimating"  # 5 h
     assert progress_text(Progress(10, 10, 0, 3725.0)) == "10 of 10 cases, took 1:02:05"
     assert "1 done again" in progress_text(Progress(1, 2, 0, 1.0, retried=1))
+
+
+def test_what_was_computed_fits_the_terminal_with_its_thousands_grouped(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    found = run_study(write(tmp_path, STUDY), StudySettings(workers=1))
+    many = replace(found, computed=10_000, reused=1_234_567, retried=2_000)
+    monkeypatch.setenv("COLUMNS", "60")
+    said = paragraph(stored_text(many))
+    assert said.endswith("\n")
+    folder = str(found.store.folder)
+    assert all(len(line) <= 60 for line in said.splitlines() if folder not in line)
+    flat = " ".join(said.split())
+    assert flat.startswith("10 000 cases computed, 1 234 567 already there, 2 000 done again")
+    assert paragraph(stored_text(replace(found, computed=1))).startswith("1 case computed")
 
 
 def test_progress_in_a_log_is_written_now_and_then() -> None:
@@ -224,7 +241,7 @@ def test_progress_in_a_log_is_written_now_and_then() -> None:
     for done in range(1001):
         line(Progress(done, 1000, 0, done / 100))
     assert len(stream.getvalue().splitlines()) <= 3
-    assert stream.getvalue().endswith("1000 of 1000 cases, took 00:10\n")
+    assert stream.getvalue().endswith("1 000 of 1 000 cases, took 00:10\n")
 
 
 def test_console_tables_line_up() -> None:

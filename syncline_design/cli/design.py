@@ -308,7 +308,7 @@ def study(
     deadline = deadline_of(time_limit)
     from syncline_design.report.on_study import on_study
     from syncline_design.report.progress_line import ProgressLine
-    from syncline_design.report.render_console import console
+    from syncline_design.report.render_console import console, paragraph
     from syncline_design.report.studies import STUDY_FORMATS, render_study
     from syncline_design.report.study_words import stored_text
     from syncline_design.studies import StudySettings, run_study
@@ -324,7 +324,7 @@ def study(
     settings = StudySettings(seed, workers, store, scheduler, dask, fresh=fresh)
     with watched(deadline, targets, quiet=quiet, steps=False):
         result = run_study(study_file, settings, None if quiet else ProgressLine())
-    text = f"{console(on_study(result))}\n{stored_text(result)}"
+    text = f"{console(on_study(result))}\n{paragraph(stored_text(result))}"
     emit(text, targets, lambda name: render_study(name, result), quiet=quiet,
          charts=lambda: {"": on_study(result)})  # fmt: skip
     return result.exit_code

@@ -202,12 +202,17 @@ def format_chance(log10_p: float | None) -> str:
     return f"{digit}e{power:03d}" if digit < 10 else f"1e{power + 1:03d}"
 
 
+def grouped(count: int) -> str:
+    """`10 000`: a whole number with thousands grouped."""
+    return f"{count:,}".replace(",", " ")
+
+
 def format_nats(nats: float, digits: int | None = None) -> str:
     """`13 436.0 nat`: thousands grouped; one decimal, or so many significant figures."""
     text = to_places(nats, 1) if digits is None else to_digits(nats, digits)
     whole, point, rest = text.partition(".")
     if whole.isdigit():
-        whole = f"{int(whole):,}".replace(",", " ")
+        whole = grouped(int(whole))
     return f"{whole}{point}{rest} nat"
 
 

@@ -24,6 +24,8 @@ _REPORT: Final = "syncline_design.report"
 _MAKERS: Final = {
     "Acceptance": (f"{_REPORT}.on_acceptance", "on_acceptance"),
     "Audit": (f"{_REPORT}.on_audit", "on_audit"),
+    "FrontDesign": (_HERE, "on_front_design"),
+    "RankedDesign": (_HERE, "on_front_design"),
     "DiagnosisAndDesign": (f"{_REPORT}.on_diagnosis", "on_diagnosis"),
     "Diff": (f"{_REPORT}.on_diff", "on_diff"),
     "Finding": (_HERE, "on_finding"),
@@ -63,6 +65,23 @@ def on_finding(found: Finding) -> Document:
     name = f"{found.sensor}, {found.stage}"
     nodes = section("finding", "What is known of it", [finding_node(found)])
     return Document("Finding", outcome, name, (said,), (), tuple(nodes))
+
+
+def on_front_design(one: RankedDesign | FrontDesign) -> Document:
+    """One of the best designs, or of those on a front, by itself."""
+    takes = [
+        ("Price", one.cost, numbers.money(one.cost, one.design.currency)),
+        ("Mass", one.mass, numbers.in_unit(one.mass, "kg")),
+        ("Power", one.power, numbers.in_unit(one.power, "W")),
+        ("Error", one.error_m, numbers.length(one.error_m)),
+    ]
+    shown = [(label, words) for label, value, words in takes if value is not None]
+    rows = [(f"{stage.name} {role}", entry.name, entry.timestamping_name)
+            for stage, role, entry in one.design.roles]  # fmt: skip
+    payload = show(table("Payload", ("Role", "Sensor", "Timestamping"), rows), silent=True)
+    outcome = Outcome("", "", ", ".join(words for _, words in shown))
+    name = ", ".join(entry.name for _, _, entry in one.design.roles)
+    return Document("Design", outcome, name, (), (), tuple(section("payload", "Payload", payload)))
 
 
 def on_optimization(result: Optimization) -> Document:

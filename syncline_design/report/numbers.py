@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -92,6 +93,18 @@ def drive_time(minutes: float) -> str:
         return typeset(f"{places(minutes / 60.0, 0)} h")
     shown = places(minutes, 0) if minutes >= 10.0 else number(minutes, 2)
     return typeset(f"{shown} min")
+
+
+def drive_times(minutes: Sequence[float | None]) -> list[str]:
+    """Lengths of drives beside one another, in one unit; empty where there is none."""
+    told = [value for value in minutes if value is not None]
+    if not told or max(told) < 1.0 or min(told) >= 600.0:
+        return ["" if value is None else drive_time(value) for value in minutes]
+
+    def in_minutes(value: float) -> str:
+        return count(value) if value >= 10.0 else number(value, 2)
+
+    return ["" if v is None else typeset(f"{in_minutes(v)} min") for v in minutes]
 
 
 def from_to(from_s: float, to_s: float) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -191,11 +192,13 @@ def _standard(found: Plan) -> list[Node]:
     if not found.standard:
         return []
     own, keys = found.after[-1], _shown(found)
-    minutes = found.duration_s / 60.0 if found.reached else None
-    rows = [_standard_row("this drive", found, own.sigma, pair_figure(own), minutes)]
+    minutes = [found.duration_s / 60.0 if found.reached else None]
+    minutes += [one.minutes for one in found.standard]
+    first, *others = map(Cell, numbers.drive_times(minutes), map(_sort, minutes))
+    rows = [_standard_row("this drive", found, own.sigma, pair_figure(own), first)]
     rows += [
-        _standard_row(one.name, found, one.sigma, pair_figure(one), one.minutes, own.sigma)
-        for one in found.standard
+        _standard_row(one.name, found, one.sigma, pair_figure(one), reached, own.sigma)
+        for one, reached in zip(found.standard, others, strict=True)
     ]
     heads = ("Plan", "Until reached #", *(f"{parameter(k)} #" for k in keys),
              f"{pair_head(found)} #")  # fmt: skip
@@ -208,17 +211,16 @@ def _standard(found: Plan) -> list[Node]:
 
 
 def _standard_row(
-    name: str, found: Plan, sigma: Mapping[str, float], of_pair: str, minutes: float | None,
+    name: str, found: Plan, sigma: Mapping[str, float], of_pair: str, reached: Cell,
     own: Mapping[str, float] | None = None,
 ) -> tuple[Cell | str, ...]:  # fmt: skip
     """A plan's row; own: the uncertainties with which this drive reaches what is asked."""
     sizes = _column_sizes(found)
     sharp = own is not None and found.reached and all(sigma[k] <= own[k] for k in _shown(found))
     never = "never told apart" if sharp else "never"
-    reached = Cell(never if minutes is None else numbers.drive_time(minutes), _sort(minutes))
     return (
         name,
-        reached,
+        reached if reached.text else replace(reached, text=never),
         *(Cell(figure(k, sigma[k], sizes[k]), _sort(sigma[k])) for k in _shown(found)),
         Cell(of_pair),
     )

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
+from syncline_design.model.figure_text import grouped
 from syncline_design.report import numbers
 
 if TYPE_CHECKING:
@@ -91,11 +92,11 @@ def busy(doing: str) -> Iterator[None]:
 
 def progress_text(progress: Progress) -> str:
     """`180 of 500 cases, 40 already there, 00:12 left`."""
-    parts = [f"{progress.done} of {progress.total} cases"]
+    parts = [f"{grouped(progress.done)} of {grouped(progress.total)} cases"]
     if progress.reused:
-        parts.append(f"{progress.reused} already there")
+        parts.append(f"{grouped(progress.reused)} already there")
     if progress.retried:
-        parts.append(f"{progress.retried} done again")
+        parts.append(f"{grouped(progress.retried)} done again")
     left = progress.remaining_s
     if progress.done < progress.total:
         parts.append("estimating" if left is None else f"{_clock(left)} left")

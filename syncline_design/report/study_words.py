@@ -130,10 +130,13 @@ def rule_sentence(result: StudyResult) -> str:
 
 def stored_text(result: StudyResult) -> str:
     """What was computed and what was there already: it differs from run to run."""
-    retried = f", {result.retried} done again after a worker died" if result.retried else ""
+    again = f", {numbers.count(result.retried)} done again after a worker died"
+    computed = (
+        f"{numbers.count(result.computed)} case{'' if result.computed == 1 else 's'} computed"
+    )
     return (
-        f"{result.computed} cases computed, {result.reused} already there{retried}; "
-        f"kept in {result.store.folder}\n"
+        f"{computed}, {numbers.count(result.reused)} already there"
+        f"{again if result.retried else ''}; kept in {result.store.folder}"
     )
 
 

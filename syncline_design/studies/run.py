@@ -12,7 +12,7 @@ from syncline_design.choice.outcome import NoVerdict
 from syncline_design.machine.deadline import Deadline, OutOfTime, in_force, within
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import read_as
-from syncline_design.model.figure_text import to_digits
+from syncline_design.model.figure_text import grouped, to_digits
 from syncline_design.studies.case import CaseSettings, case_keys
 from syncline_design.studies.cluster import ClusterError, run_on_cluster
 from syncline_design.studies.inputs import Looked, full_key
@@ -174,7 +174,7 @@ class _Run:
         limit = f"the time limit of {to_digits(in_force().limit_s or 0.0)} s was reached"
         if self.done is None:
             return f"{limit} before the first case"
-        done, total = self.done
+        done, total = map(grouped, self.done)
         return f"{limit}: {done} of {total} cases are done and kept; run the study again to go on"
 
     def _say(self, done: int, total: int, reused: int) -> None:
