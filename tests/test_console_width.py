@@ -7,11 +7,15 @@ import io
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from syncline_design.cli.app import app
 from syncline_design.report import render_console
 from syncline_design.report.console_table import fitted, folded
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.table import Cell, table
+from syncline_design.spec.catalog import SECTIONS
+from syncline_design.spec.load import builtin_collection
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings
 from tests.checked import check_file
@@ -133,6 +137,43 @@ def test_a_name_that_no_column_holds_goes_on_after_one_of_its_joints() -> None:
     assert "".join(parts) == long
     assert parts[0].endswith("_")
     assert max(map(len, fitted(table("T", ("A", "B"), [("x" * 90, "y")]), 40))) <= 40
+
+
+@functools.cache
+def catalog_words(*arguments: str) -> str:
+    """What a command on the catalogs prints where nothing has to give way."""
+    return said_of_catalogs(4000, *arguments)
+
+
+def said_of_catalogs(width: int, *arguments: str) -> str:
+    done = CliRunner().invoke(app, ["catalog", *arguments], env={"COLUMNS": str(width)})
+    assert done.exit_code == 0
+    return done.stdout
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_catalogs_fit_the_terminal_and_say_the_same(width: int) -> None:
+    """But for an address or a path that no line holds, which stands alone to be copied."""
+    catalog = builtin_collection().catalog()
+    shown = [one for section in SECTIONS for one in getattr(catalog, section)]
+    asked = [("list",), ("list", "--reach", "200 m"), *(("show", one) for one in shown[::7])]
+    for arguments in [*asked, ("show", "sbg_apogee"), ("show", "riegl_vux1uav")]:
+        narrow = said_of_catalogs(width, *arguments)
+        assert set(catalog_words(*arguments).split()) <= {
+            *narrow.replace(":", "").split(), *narrow.split(), "Figure", "Value", "Basis"
+        }  # fmt: skip
+        for line in narrow.splitlines():
+            assert len(line) <= width or len(line.split()) == 1, line
+            assert len(line) <= width or "/" in line, line
+
+
+def test_a_search_through_the_catalogs_finds_ids_with_their_names() -> None:
+    catalog = builtin_collection().catalog()
+    lines = said_of_catalogs(80, "list").splitlines()
+    for section in SECTIONS:
+        for identity, entry in getattr(catalog, section).items():
+            found = [one for one in lines if one.startswith(f"  {identity}  ")]
+            assert any(entry.name.split()[0] in line for line in found)
 
 
 @pytest.mark.parametrize(

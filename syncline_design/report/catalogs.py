@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from typing import Annotated, Any, Final
 
@@ -11,7 +11,8 @@ from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.model.conversion import conversion_of
 from syncline_design.model.figure_text import format_like, format_quantity
 from syncline_design.model.quantity import Dimension, Quantity, UnitError
-from syncline_design.report.render_console import aligned
+from syncline_design.report.render_console import hanging, table_lines
+from syncline_design.report.table import table
 from syncline_design.report.text import visible
 from syncline_design.spec.catalog import SECTIONS as SECTIONS
 from syncline_design.spec.catalog import Catalog, EntryKeys, SensorEntry
@@ -196,27 +197,37 @@ def _listed(section: str, identity: str, entry: EntryKeys, origins: Origins) -> 
 
 
 def list_text(catalog: Catalog, found: CatalogList) -> str:
-    """One line an entry: id, name, key figures."""
+    """Entry by entry: id and name in its first line, then key figures as far as the line goes."""
     blocks = []
     for name in SECTIONS:
         entries: Mapping[str, EntryKeys] = getattr(catalog, name)
         kept = [one.id for one in found.entries if one.section == name]
-        rows = [[one, visible(entries[one].name), _digest(entries[one])] for one in kept]
+        rows = [(one, entries[one].name, _digest(entries[one])) for one in kept]
         if rows:
-            blocks.append("\n".join([name, *aligned(rows)]))
+            blocks.append("\n".join([name, *_list_lines(rows)]))
     lacking: dict[str, list[str]] = {}
     for one in found.undecided:
         lacking.setdefault(one.key, []).append(one.id)
     blocks += [
-        f"{len(ids)} more give no {key}, look it up: {', '.join(ids)}"
+        "\n".join(hanging(f"{len(ids)} more give no {key}, look it up: {', '.join(ids)}"))
         for key, ids in lacking.items()
     ]
     return "\n\n".join(blocks or ["no entry fits"]) + "\n"
 
 
+def _list_lines(rows: Iterable[tuple[str, str, str]]) -> Iterator[str]:
+    """An entry's id and name, so that a search for either shows both, and its figures below."""
+    for identity, name, digest in rows:
+        yield from hanging(f"{identity}  {name}", 2)
+        if digest:
+            yield from hanging(digest, 4, deeper=0)
+
+
 def _digest(entry: EntryKeys) -> str:
     figures = [
-        f"{key} {shown(value)}" for key, value in _figures(entry) if key not in _NOT_IN_A_LINE
+        f"{key}\N{NO-BREAK SPACE}{shown(value)}"
+        for key, value in _figures(entry)
+        if key not in _NOT_IN_A_LINE
     ]
     return ", ".join(figures)
 
@@ -295,17 +306,17 @@ def _one_sigma(value: float, dimension: Dimension) -> str:
 
 def entry_text(entry: WholeEntry) -> str:
     """An entry for people: its figures, marked where they are assumed, then what was read."""
-    rows = [[one.key, visible(one.value), one.basis or ""] for one in entry.figures]
-    lines = [f"{entry.id} ({entry.section}): {visible(entry.name)}", *aligned(rows)]
+    rows = [(one.key, visible(one.value), one.basis or "") for one in entry.figures]
+    head = f"{entry.id} ({entry.section}): {entry.name}"
+    shown = table("Figures", ("Figure", "Value", "Basis"), rows)
+    lines = [*hanging(head), *table_lines(shown, "  ", silent=True)]
     printed = [part for one in entry.figures for part in one.printed]
     if printed:
-        lines.append("  read in the sources, and how it becomes one sigma per axis:")
+        lines += hanging("read in the sources, and how it becomes one sigma per axis:", 2)
         lines += [line for one in printed for line in _printed_lines(one)]
-    lines += [
-        f"  unusual: {one.key}: {visible(one.unusual)}" for one in entry.figures if one.unusual
-    ]
-    told = [(label, getattr(entry, label)) for label in ("source", "note")]
-    lines += [f"  {label}: {visible(text)}" for label, text in told if text]
+    told = [(f"unusual: {one.key}", one.unusual) for one in entry.figures]
+    told += [(label, getattr(entry, label)) for label in ("source", "note")]
+    lines += [line for label, text in told if text for line in hanging(f"{label}: {text}", 2)]
     return "\n".join(lines) + "\n"
 
 
@@ -314,11 +325,11 @@ def _printed_lines(one: Printed) -> Iterator[str]:
     at = f", {one.at}" if one.at else ""
     conversion = f": {one.conversion}" if one.conversion else ""
     conversion += f"; one sigma {one.one_sigma}" if one.one_sigma else ""
-    yield visible(f"    {one.part}: {one.figure}{over} ({one.kind}{at}){conversion}")
+    yield from hanging(f"{one.part}: {one.figure}{over} ({one.kind}{at}){conversion}", 4)
     address = f", {one.address}" if one.address else ""
-    yield visible(f"      {one.source}{address}, read {one.read}")
+    yield from hanging(f"{one.source}{address}, read {one.read}", 6)
     if one.note:
-        yield visible(f"      {one.note}")
+        yield from hanging(one.note, 6)
 
 
 def suggestion(catalog: Catalog, identity: str) -> str:

@@ -87,6 +87,16 @@ def _wrapped(text: str, indent: str, first: str | None = None) -> list[str]:
     return folded(text, min(columns(), WIDTH), indent if first is None else first, indent)
 
 
+def paragraph(text: str) -> str:
+    """A text by itself, no wider than the terminal; ends with a newline."""
+    return "\n".join(_wrapped(text, "")) + "\n"
+
+
+def hanging(text: str, indent: int = 0, deeper: int = 2) -> list[str]:
+    """A text in lines that fit the terminal, all but the first of them deeper in."""
+    return _wrapped(text, " " * (indent + deeper), " " * indent)
+
+
 def _lines(nodes: Iterable[Node], indent: str, paint: Paint) -> Iterator[str]:
     for node in nodes:
         match node:
@@ -144,10 +154,3 @@ def table_lines(
         yield f"{indent}{line}".rstrip()
     if shown.note:
         yield from _wrapped(unticked(shown.note), indent)
-
-
-def aligned(rows: Sequence[Sequence[str]], indent: int = 2) -> list[str]:
-    """Rows without heads as columns."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows)
-    return [" " * indent + line.rstrip() for line in lines]
