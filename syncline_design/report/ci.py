@@ -38,7 +38,8 @@ SILENT: Final = ("pass", "not_reached")  # nothing to annotate
 class Notice:
     """One thing said about a spec: rule (the requirement's kind), id, place, one sentence.
 
-    figures: of a requirement, by name, in the unit that is named beside them.
+    mission: whose requirement it is, where a spec has several.  figures: of a requirement, by name,
+    in the unit that is named beside them.
     """
 
     level: Level
@@ -50,6 +51,12 @@ class Notice:
     message: str
     justification: str = ""
     figures: tuple[tuple[str, str], ...] = ()
+    mission: str = ""
+
+    @property
+    def label(self) -> str:
+        """The requirement by its id, after the mission whose it is; empty where it is of none."""
+        return f"{self.mission} {self.id}".strip()
 
 
 def notices(verdict: Checked) -> list[Notice]:
@@ -59,21 +66,19 @@ def notices(verdict: Checked) -> list[Notice]:
     found = list(_requirements(verdict))
     if verdict.verdict in ("infeasible", "indeterminate") and not _is_told(found, verdict):
         found.insert(0, _no_design(verdict))
-    return found + [_warning(entry, verdict) for entry in verdict.warnings]
+    left = [entry for entry in verdict.warnings if not _says_waiver(entry, found)]
+    return found + [_warning(entry, verdict) for entry in left]
 
 
 def _requirements(verdict: Verdict) -> Iterator[Notice]:
     """Every requirement; of several missions each mission's, at the place of its own limit."""
-    for row in () if verdict.missions else verdict.requirements:
-        yield _requirement(row, verdict)
-    for row in verdict.requirements if verdict.missions else ():
-        if row.kind == "failing_share":  # of all missions together
-            yield _requirement(row, verdict)
-    for mission in verdict.missions or ():
-        for row in mission.requirements:
-            found = _requirement(row, verdict)
-            message = f"mission {mission.name}: {found.message}"
-            yield replace(found, id=f"{mission.name} {row.id}", message=message)
+    for mission, row in verdict.judged_rows:
+        found = _requirement(row, verdict, mission)
+        if mission is None:
+            yield found
+        else:
+            message = f"mission {mission}: {found.message}"
+            yield replace(found, mission=mission, message=message)
 
 
 def closing_words(verdict: Checked) -> str:
@@ -92,10 +97,20 @@ def _is_told(found: list[Notice], verdict: Verdict) -> bool:
 
 
 def _warning(entry: Caution, verdict: Verdict) -> Notice:
-    """At the requirement that it is about, else at the top."""
-    places = {row.id: (row.line or 1, row.column or 1) for row in verdict.requirements}
-    place = places.get(entry.requirement or "", (1, 1))
+    """At the requirement that it is about, of the mission that it is about; else at the top."""
+    places = [
+        (row.line or 1, row.column or 1)
+        for mission, row in verdict.judged_rows
+        if row.id == entry.requirement and (not entry.missions or mission in entry.missions)
+    ]
+    place = places[0] if places else (1, 1)
     return Notice("warning", entry.code, "", verdict.file, *place, entry.message)
+
+
+def _says_waiver(entry: Caution, found: list[Notice]) -> bool:
+    """Whether what a warning says of a waiver stands with the requirement itself."""
+    told = {one.id for one in found if one.level in ("waived", "fail")}
+    return entry.code == "waiver" and entry.requirement in told
 
 
 def _problem(entry: FileProblem) -> Notice:
@@ -104,7 +119,7 @@ def _problem(entry: FileProblem) -> Notice:
     return Notice("fail", "spec", "", entry.file, *place, message)
 
 
-def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
+def _requirement(row: RequirementResult, verdict: Verdict, mission: str | None = None) -> Notice:
     levels: dict[str, Level] = {"pass": "pass", "fail": "fail", "indeterminate": "undecided"}
     level, message = levels[row.status], requirement_sentence(row)
     conflict = _conflict_of(row, verdict)
@@ -119,10 +134,10 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
     known, why = verdict.baseline, waiver_text(row) if level == "waived" else ""
     if level == "fail" and row.waiver and row.waiver.expired:
         message = _with(message, waiver_text(row))
-    if known is not None and level in ("fail", "undecided") and known.forgives(row.id):
+    if known is not None and level in ("fail", "undecided") and known.forgives(row.id, mission):
         level, why = "known", _no_worse(known)
-    elif known is not None and level != "pass" and not known.forgives(row.id):
-        message = _with(message, _then(known, row))
+    elif known is not None and level != "pass" and not known.forgives(row.id, mission):
+        message = _with(message, _then(known, row, mission))
     return Notice(level, row.kind, row.id, verdict.file, *place, message, why, _figures(row))
 
 
@@ -139,15 +154,21 @@ def _no_worse(known: Baseline) -> str:
     return f"no worse than in {known.file}"
 
 
-def _then(known: Baseline, row: RequirementResult) -> str:
-    """What a requirement was at in the baseline, where both are known."""
-    was = next((one.was for one in known.requirements if one.id == row.id), None)
-    if was is not None and was.kind is not None:
-        return f"new: in {known.file} it limited {quantity_then(was)}"
-    if was is None or was.value is None:
+def _then(known: Baseline, row: RequirementResult, mission: str | None) -> str:
+    """How a requirement stood in the baseline; that it is new, where it was not there."""
+    one = known.of(row.id, mission)
+    if one is None or known.verdict is None:
         return ""
-    value, limit = numbers.held(was.value, was), numbers.limit(was)
-    return f"in {known.file} it was {value} of {limit}"
+    was = one.was
+    if was is None:
+        return f"new: it is not in {known.file}" if one.change == "new" else ""
+    if was.kind is not None:
+        return f"new: in {known.file} it limited {quantity_then(was)}"
+    limit = numbers.limit(was)
+    if was.value is None:
+        return f"in {known.file} its limit was {limit}" if was.limit != row.limit else ""
+    waived = ", waived" if was.waived else ""
+    return f"in {known.file} it was {numbers.held(was.value, was)} of {limit}{waived}"
 
 
 def _figures(row: RequirementResult) -> tuple[tuple[str, str], ...]:

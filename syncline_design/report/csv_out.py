@@ -11,11 +11,11 @@ from syncline_design.report.json_out import json_text
 from syncline_design.report.text import spreadsheet_safe
 from syncline_design.report.verdict_words import since_word, status_id, waiver_text
 from syncline_design.verdict.since import RequirementSince
-from syncline_design.verdict.tree import Checked, Refused, Verdict
+from syncline_design.verdict.tree import Checked, Refused, RequirementResult, Verdict
 
 _COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value", "limit", "unit",
             "margin", "line", "warnings", "waiver", "since_baseline", "kind_then", "status_then",
-            "value_then", "limit_then", "unit_then")  # fmt: skip
+            "value_then", "limit_then", "unit_then", "mission")  # fmt: skip
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
@@ -86,24 +86,36 @@ def render_bill(verdicts: Sequence[Checked]) -> str:
 
 def _rows(verdict: Verdict) -> Iterator[dict[str, Any]]:
     """Requirements with the codes of the warnings about them, what their waivers do, and what
-    became of them since the baseline; a miss under a waiver in force is `waived`, as in JUnit."""
+    became of them since the baseline; a miss under a waiver in force is `waived`, as in JUnit.
+
+    Of several missions first what holds over all of them, then each mission's own.
+    """
     since = _since(verdict)
-    for row in verdict.requirements:
-        codes = " ".join(w.code for w in verdict.warnings if w.requirement == row.id)
+    rows: list[tuple[str | None, RequirementResult]] = [(None, r) for r in verdict.requirements]
+    rows += [one for one in verdict.judged_rows if one[0] is not None]
+    for mission, row in rows:
+        codes = " ".join(
+            w.code for w in verdict.warnings
+            if w.requirement == row.id and (not w.missions or mission in w.missions)
+        )  # fmt: skip
         told = {"requirement": row.id, "warnings": codes, "waiver": waiver_text(row)}
-        earlier = _then(verdict, since[row.id]) if row.id in since else {}
-        yield row.to_json() | told | {"status": status_id(row)} | earlier
+        one = since.get((mission, row.id))
+        earlier = {} if one is None else _then(verdict, one)
+        status = {"status": status_id(row), "mission": mission or ""}
+        yield row.to_json() | told | status | earlier
 
 
 def _gone(verdict: Verdict) -> Iterator[dict[str, Any]]:
     """Requirements that only the baseline has."""
     for one in _since(verdict).values():
         if one.change == "gone":
-            yield {"requirement": one.id} | _then(verdict, one)
+            told = {"requirement": one.id, "mission": one.mission or ""}
+            yield told | _then(verdict, one)
 
 
-def _since(verdict: Verdict) -> dict[str, RequirementSince]:
-    return {one.id: one for one in verdict.baseline.requirements} if verdict.baseline else {}
+def _since(verdict: Verdict) -> dict[tuple[str | None, str], RequirementSince]:
+    rows = verdict.baseline.requirements if verdict.baseline else ()
+    return {(one.mission, one.id): one for one in rows}
 
 
 def _then(verdict: Verdict, one: RequirementSince) -> dict[str, Any]:

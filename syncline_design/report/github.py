@@ -32,7 +32,7 @@ def render_github(verdicts: Sequence[Checked]) -> str:
 
 def github_command(notice: Notice) -> str:
     """One annotation."""
-    title = f"{notice.id} {notice.rule}".strip()
+    title = f"{notice.label} {notice.rule}".strip()
     if notice.level in ("waived", "known"):
         title += f" ({notice.level})"
     message = notice.message + (f"; {notice.justification}" if notice.justification else "")

@@ -59,7 +59,7 @@ def suite_of(name: str, file: str, found: Sequence[Notice], word: str) -> Elemen
 
 
 def _case(notice: Notice, file: str) -> ElementTree.Element:
-    name = f"{notice.id} {notice.rule}" if notice.id else notice.rule
+    name = f"{notice.label} {notice.rule}".strip()
     case = ElementTree.Element(
         "testcase",
         {
@@ -74,7 +74,8 @@ def _case(notice: Notice, file: str) -> ElementTree.Element:
     place = f"{visible(notice.file)}:{notice.line}:{notice.column}"
     if notice.id:
         listed = ElementTree.SubElement(case, "properties")
-        told = (("requirement", notice.id), ("kind", notice.rule), *notice.figures)
+        whose = (("mission", notice.mission),) if notice.mission else ()
+        told = (("requirement", notice.id), *whose, ("kind", notice.rule), *notice.figures)
         for key, value in (*told, ("place", place)):
             ElementTree.SubElement(listed, "property", {"name": key, "value": visible(value)})
     if notice.level == "fail":

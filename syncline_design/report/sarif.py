@@ -128,5 +128,5 @@ def artifact_uri(file: str) -> str:
 
 def _fingerprint(notice: Notice) -> str:
     """Stable under changes of the figures: file, rule and requirement."""
-    parts = (notice.file, notice.rule, notice.id or notice.message)
+    parts = (notice.file, notice.rule, notice.label or notice.message)
     return hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]

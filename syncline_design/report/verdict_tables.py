@@ -14,6 +14,7 @@ from syncline_design.report.verdict_words import (
     larger,
     margin_text,
     relative_margin,
+    row_now,
     selection_reason,
     since_word,
     status_of,
@@ -63,15 +64,14 @@ def since(verdict: Verdict) -> Table | None:
     baseline = verdict.baseline
     if baseline is None or not baseline.requirements:
         return None
-    now = {row.id: row for row in verdict.requirements}
     rows = []
     for one in baseline.requirements:
-        row, was = now.get(one.id), one.was
+        row, was = row_now(one, verdict), one.was
         word = None if row is None else status_of(row)
         then = None if was is None else status_word(was.status, waived=bool(was.waived))
         since = since_word(one, verdict)
         rows.append((
-            Cell(one.id),
+            Cell(f"{one.mission or ''} {one.id}".strip()),
             Cell(since.word, tone=since.tone),
             "-" if word is None else word.word,
             _both(row),

@@ -145,15 +145,24 @@ def status_id(row: RequirementResult) -> str:
 
 def since_word(one: RequirementSince, verdict: Verdict) -> Outcome:
     """What became of a requirement; of one that no design is there to judge, that it is not."""
-    row = next((row for row in verdict.requirements if row.id == one.id), None)
+    row = row_now(one, verdict)
     word, since = None if row is None else status_of(row), SINCE[one.change]
-    if one.change == "same" and word is STATUSES["indeterminate"] and verdict.design is None:
+    if one.judged is False and word is not None:
         return replace(word, word="not judged")
     if one.change == "worse" and word is STATUSES["waived"]:
         return replace(since, tone=word.tone, word=f"{since.word}, {word.word}")
     if one.was is not None and one.was.kind is not None:
         return replace(since, word=f"{since.word}: limited {quantity_then(one.was)} then")
     return since
+
+
+def row_now(one: RequirementSince, verdict: Verdict) -> RequirementResult | None:
+    """A requirement as it stands now: of its mission, or of all together; None where it is gone."""
+    rows = verdict.requirements
+    if one.mission is not None:
+        own = [m.requirements for m in verdict.missions or () if m.name == one.mission]
+        rows = own[0] if own else ()
+    return next((row for row in rows if row.id == one.id), None)
 
 
 def quantity_then(was: Earlier) -> str:
@@ -177,7 +186,8 @@ def since_sentence(baseline: Baseline, verdict: Verdict) -> str:
     file = visible(baseline.file)
     if baseline.verdict is None:
         return f"{file} holds no verdict on this spec: it is judged as it is."
-    waived = [one.id for one in baseline.requirements if one.was and one.was.waived]
+    waived = [one.id for one in baseline.requirements
+              if one.was and one.was.waived and one.mission is None]  # fmt: skip
     then = with_waived(OUTCOMES[baseline.verdict], waived if baseline.verdict == "meets" else ())
     was = f"Then ({file}): {then.word}."
     if baseline.worse:
@@ -193,8 +203,10 @@ def since_sentence(baseline: Baseline, verdict: Verdict) -> str:
 def worse_but_waived(verdict: Verdict) -> list[str]:
     """Ids of what got worse since the baseline and does not count, by a waiver in force."""
     since = verdict.baseline.requirements if verdict.baseline else ()
-    worse, waived = {one.id for one in since if one.change == "worse"}, verdict.requirements
-    return [visible(one) for one in waived_misses(waived) if one in worse]
+    worse = {(one.mission, one.id) for one in since if one.change == "worse"}
+    found = [f"{mission or ''} {row.id}".strip() for mission, row in verdict.judged_rows
+             if row.status == "fail" and row.is_waived and (mission, row.id) in worse]  # fmt: skip
+    return list(map(visible, found))
 
 
 def kind_text(row: RequirementResult) -> str:

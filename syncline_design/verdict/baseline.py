@@ -3,7 +3,8 @@
 Worse is: a requirement passed and no longer does, or was open and fails; it fails by more (value
 over limit, of a simulated one where the two intervals do not meet; of two verdicts without a
 design, by a lower limit); it is new, or limits another quantity than it did, and does not pass; or
-the verdict as a whole fell from `meets` to `indeterminate`, `fails`, `infeasible`.
+the verdict as a whole fell from `meets` to `indeterminate`, `fails`, `infeasible`.  Of missions
+each is held against itself.
 """
 
 from __future__ import annotations
@@ -13,8 +14,14 @@ from dataclasses import replace
 from typing import Final
 
 from syncline_design.verdict.since import Baseline, Earlier, RequirementSince, SinceBaseline
-from syncline_design.verdict.tree import RequirementResult, Verdict, waived_misses
+from syncline_design.verdict.tree import (
+    MissionVerdict,
+    RequirementResult,
+    Verdict,
+    waived_misses,
+)
 
+Judged = Verdict | MissionVerdict
 _OUTCOMES: Final = ("meets", "indeterminate", "fails", "infeasible")  # each worse than the last
 _STATUSES: Final = ("pass", "indeterminate", "fail")
 _ROUNDING = 1e-9  # relative; figures that differ by less are the same
@@ -30,11 +37,55 @@ def against(verdict: Verdict, earlier: Sequence[Verdict], file: str) -> Verdict:
     if before is None:
         found = Baseline(file, None, verdict.verdict != "meets", ())
         return replace(verdict, baseline=found)
-    rows = tuple(_rows(verdict, before))
+    rows = tuple(_with_missions(verdict, before))
     found = Baseline(file, before.verdict, _fell(verdict, before), rows)
-    missed = [row.id for row in verdict.requirements if _standing(row) > 0]
-    worse = found.worse or any(not found.forgives(one) for one in missed)
+    missed = [(mission, row) for mission, row in verdict.judged_rows if _standing(row) > 0]
+    worse = found.worse or any(not found.forgives(row.id, mission) for mission, row in missed)
     return replace(verdict, baseline=replace(found, worse=worse))
+
+
+def _with_missions(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
+    """What became of every requirement; of missions, each mission's after what is said of all.
+
+    A row of all missions is that of the one nearest its limit, which may be another than before:
+    so it got worse where any mission's did.
+    """
+    then = {mission.name: mission for mission in before.missions or ()}
+    own = [
+        replace(row, mission=mission.name)
+        for mission in verdict.missions or ()
+        for row in _of_mission(mission, then.pop(mission.name, None))
+    ]
+    own += [
+        RequirementSince(row.id, "gone", _earlier(row), name)
+        for name, mission in then.items() if verdict.missions
+        for row in mission.requirements if not _is_implied(row)
+    ]  # fmt: skip
+    missed = {(name, row.id) for name, row in verdict.judged_rows if _standing(row) > 0}
+    for row in _rows(verdict, before):
+        each = [one for one in own if one.id == row.id and one.change != "gone"]
+        yield replace(row, change=_of_all(row.change, each, missed)) if each else row
+    yield from own
+
+
+def _of_mission(now: MissionVerdict, then: MissionVerdict | None) -> Iterator[RequirementSince]:
+    if then is not None:
+        yield from _rows(now, then)
+        return
+    for row in now.requirements:
+        yield RequirementSince(row.id, "new", None)
+
+
+def _of_all(
+    change: SinceBaseline, each: Sequence[RequirementSince], missed: set[tuple[str | None, str]]
+) -> SinceBaseline:
+    """What became of a requirement over all missions, by what became of each one's."""
+    if change in ("new", "gone"):
+        return change
+    if any(one.change == "worse" or (one.change == "new" and (one.mission, one.id) in missed)
+           for one in each):  # fmt: skip
+        return "worse"
+    return "better" if any(one.change == "better" for one in each) else "same"
 
 
 def _of_same_spec(verdict: Verdict, earlier: Sequence[Verdict]) -> Verdict | None:
@@ -47,7 +98,7 @@ def _of_same_spec(verdict: Verdict, earlier: Sequence[Verdict]) -> Verdict | Non
     return None
 
 
-def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
+def _rows(verdict: Judged, before: Judged) -> Iterator[RequirementSince]:
     old = {row.id: row for row in before.requirements}
     for row in verdict.requirements:
         was = old.pop(row.id, None)
@@ -64,7 +115,9 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
             change = _without_design(verdict, before, row, was)
         else:
             change = _since(row, was)
-        yield RequirementSince(row.id, change, None if was is None else _earlier(was))
+        judged = None if verdict.design or row.status != "indeterminate" else False
+        told = None if was is None else _earlier(was)
+        yield RequirementSince(row.id, change, told, judged=judged)
     for was in old.values():
         if verdict.design is not None or not _is_implied(was):
             yield RequirementSince(was.id, "gone", _earlier(was))
@@ -87,7 +140,7 @@ def _earlier(row: RequirementResult) -> Earlier:
 
 
 def _without_design(
-    verdict: Verdict, before: Verdict, row: RequirementResult, was: RequirementResult
+    verdict: Judged, before: Judged, row: RequirementResult, was: RequirementResult
 ) -> SinceBaseline:
     """Where one side has no design its rows have no figures: the verdict as a whole decides.
 
@@ -95,9 +148,9 @@ def _without_design(
     """
     if row.status == "pass":
         return _word(_standing(row) - _standing(was))
+    if row.status == "indeterminate" and verdict.design is None:
+        return "same"  # no part of what cannot be met, and no design to judge it by
     if verdict.verdict != before.verdict:
-        if row.status == "indeterminate" and verdict.design is None:
-            return "same"  # no part of what cannot be met, and no design to judge it by
         return "worse" if _fell(verdict, before) else "better"
     step = _standing(row) - _standing(was)
     if step == 0 and row.status == "fail" and row.unit == was.unit:
@@ -105,7 +158,7 @@ def _without_design(
     return _word(step)
 
 
-def _fell(verdict: Verdict, before: Verdict) -> bool:
+def _fell(verdict: Judged, before: Judged) -> bool:
     return _OUTCOMES.index(verdict.verdict) > _OUTCOMES.index(before.verdict)
 
 

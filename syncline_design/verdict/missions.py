@@ -383,4 +383,5 @@ def _warnings(
         if not several or len(names) == len(judged):
             yield caution
         else:
-            yield replace(caution, message=f"in mission {', '.join(names)}: {caution.message}")
+            told = f"in mission {', '.join(names)}: {caution.message}"
+            yield replace(caution, message=told, missions=tuple(names))

@@ -30,11 +30,17 @@ class Earlier(Record):
 
 @dataclass(frozen=True, slots=True)
 class RequirementSince(Record):
-    """What became of a requirement; was: None of a new one, unless its id was another's before."""
+    """What became of a requirement; was: None of a new one, unless its id was another's before.
+
+    mission: whose it is; None of a spec without missions, and of what is said of all of them.
+    judged: False where there is no design to hold against it, and it is no part of why.
+    """
 
     id: str
     change: SinceBaseline
     was: Earlier | None
+    mission: str | None = optional()
+    judged: bool | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +52,12 @@ class Baseline(Record):
     worse: bool  # the exit code is 0 where nothing is
     requirements: tuple[RequirementSince, ...]
 
-    def forgives(self, requirement: str) -> bool:
+    def of(self, requirement: str, mission: str | None = None) -> RequirementSince | None:
+        """What became of a requirement, of a mission where it is named."""
+        return next((row for row in self.requirements
+                     if (row.id, row.mission) == (requirement, mission)), None)  # fmt: skip
+
+    def forgives(self, requirement: str, mission: str | None = None) -> bool:
         """Whether a requirement that does not pass did no better before."""
-        return any(
-            row.id == requirement and row.change in ("same", "better") for row in self.requirements
-        )
+        found = self.of(requirement, mission)
+        return found is not None and found.change in ("same", "better")

@@ -181,13 +181,17 @@ class MissionHorizon(Record):
 
 @dataclass(frozen=True, slots=True)
 class Caution(Record):
-    """One warning; entry: of a catalog; key: its figure; requirement: an id of the spec."""
+    """One warning; entry: of a catalog; key: its figure; requirement: an id of the spec.
+
+    missions: those that it is about, where it is not about all.
+    """
 
     code: str
     message: str
     entry: str | None = optional()
     key: str | None = optional()
     requirement: str | None = optional()
+    missions: tuple[str, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -352,6 +356,15 @@ class Verdict(Record):
     def file(self) -> str:
         """The spec's path as it was given."""
         return self.spec.file
+
+    @property
+    def judged_rows(self) -> tuple[tuple[str | None, RequirementResult], ...]:
+        """Requirements with their missions: of several each mission's own, after those of all."""
+        if self.missions is None:
+            return tuple((None, row) for row in self.requirements)
+        own = [(one.name, row) for one in self.missions for row in one.requirements]
+        held = {row.id for _, row in own}
+        return (*((None, row) for row in self.requirements if row.id not in held), *own)
 
     @property
     def exit_code(self) -> int:
