@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from syncline_design.comparison.diff_result import changes
 from syncline_design.report.ci import notices
 from syncline_design.report.csv_out import render_csv
 from syncline_design.report.junit import render_junit
@@ -120,6 +121,15 @@ def test_every_output_names_the_mission_and_the_requirement_apart(tmp_path: Path
     }
     assert states == {"mission low & slow": "unchanged", "mission high": None}
     assert "high ACC-1" in console(on_verdict(now))
+
+
+def test_a_diff_tells_what_became_of_each_mission(tmp_path: Path) -> None:
+    found = changes(verdict_of(tmp_path, LOW, HIGH), verdict_of(tmp_path, LOW, WORSE, EXTRA))
+    told = {(one.mission, one.id): one for one in found.missions or ()}
+    high, extra = told["high", "ACC-1"], told["extra", "ACC-1"]
+    assert (high.old and high.old.status, high.new and high.new.status) == ("pass", "fail")
+    assert (extra.old, extra.new and extra.new.status) == (None, "fail")
+    assert found.requirements[0].mission is None
 
 
 def test_a_warning_stands_at_the_mission_that_it_is_about(tmp_path: Path) -> None:

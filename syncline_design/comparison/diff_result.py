@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Annotated
 
 from syncline_design.comparison.limits import beyond
@@ -89,13 +90,14 @@ class Standing(Record):
 
 @dataclass(frozen=True, slots=True)
 class RequirementChange(Record):
-    """A requirement before and now; None: not required."""
+    """A requirement before and now; None: not required.  mission: where it is one mission's."""
 
     id: str
     kind: str
     unit: str
     old: Standing | None
     new: Standing | None
+    mission: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,7 @@ class VerdictChanges(Record):
 
     outgrown, admitted: where the payload is another one, requirements whose value the old payload
     had is above the limit of now; whose value the new one has is above the limit before.
+    missions: the same as requirements for each mission of either side, by their names.
     """
 
     verdict: VerdictChange
@@ -114,6 +117,7 @@ class VerdictChanges(Record):
     requirements: tuple[RequirementChange, ...]
     outgrown: tuple[str, ...] | None = optional()
     admitted: tuple[str, ...] | None = optional()
+    missions: tuple[RequirementChange, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +150,7 @@ class Diff(Record):
     exit_code: int
     outgrown: tuple[str, ...] | None = optional()
     admitted: tuple[str, ...] | None = optional()
+    missions: tuple[RequirementChange, ...] | None = optional()
 
 
 def diff_of(
@@ -158,7 +163,7 @@ def diff_of(
     return Diff(
         SCHEMA, *sides, causes,
         found.verdict, found.currency, found.payload, found.sums, found.error,
-        found.requirements, exit_code, found.outgrown, found.admitted,
+        found.requirements, exit_code, found.outgrown, found.admitted, found.missions,
     )  # fmt: skip
 
 
@@ -172,9 +177,10 @@ def changes(old: Verdict, new: Verdict) -> VerdictChanges:
         payload,
         tuple(_figure(name, before[name], now[name]) for name in before),
         _figure("error", (_total(old), "m"), (_total(new), "m")),
-        tuple(_requirements(old, new)),
+        tuple(_requirements(old.requirements, new.requirements)),
         (tuple(beyond(old, new)) if payload else ()) or None,
         (tuple(beyond(new, old)) if payload else ()) or None,
+        tuple(_by_mission(old, new)) or None,
     )
 
 
@@ -213,9 +219,21 @@ def _picks(verdict: Verdict) -> dict[str, Pick]:
     }
 
 
-def _requirements(old: Verdict, new: Verdict) -> Iterator[RequirementChange]:
-    before = {row.id: row for row in old.requirements}
-    after = {row.id: row for row in new.requirements}
+def _by_mission(old: Verdict, new: Verdict) -> Iterator[RequirementChange]:
+    """Requirements of every mission that one side has, the old one's order first."""
+    before, after = (
+        {one.name: one.requirements for one in verdict.missions or ()} for verdict in (old, new)
+    )
+    for name in dict.fromkeys((*before, *after)):
+        for row in _requirements(before.get(name, ()), after.get(name, ())):
+            yield replace(row, mission=name)
+
+
+def _requirements(
+    old: Sequence[RequirementResult], new: Sequence[RequirementResult]
+) -> Iterator[RequirementChange]:
+    before = {row.id: row for row in old}
+    after = {row.id: row for row in new}
     for identity, either in {**before, **after}.items():
         one, other = before.get(identity), after.get(identity)
         yield RequirementChange(

@@ -259,14 +259,14 @@ def _change(figure: FigureChange, now: str) -> Cell:
 
 
 def _margins(data: Diff) -> Table | None:
-    rows = [_margin_row(entry) for entry in data.requirements]
+    rows = [_margin_row(entry) for entry in (*data.requirements, *(data.missions or ()))]
     heads = ("Requirement", "Limits", "Before", "Now")
     return table("Requirements, before and now", heads, rows) if rows else None
 
 
 def _margin_row(entry: RequirementChange) -> tuple[Cell | str, ...]:
     return (
-        Cell(entry.id),
+        Cell(f"{entry.mission or ''} {entry.id}".strip()),
         _limited(entry),
         _standing(entry.old, entry.new),
         _standing(entry.new, entry.old),
