@@ -39,6 +39,7 @@ from syncline_design.report.on_timing import on_timing
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
+from syncline_design.report.rendered import chart_files
 from syncline_design.report.studies import render_study
 from syncline_design.report.table import table
 from syncline_design.spec.load import load, load_text
@@ -485,6 +486,10 @@ def test_figures_and_tables_can_be_taken_away(browser: Any, report: Path, tmp_pa
                 page.locator("#requirements").get_by_role("button", name=f"as {word}").first.click()
             taken[word] = tmp_path / waiting.value.suggested_filename
             waiting.value.save_as(taken[word])
+        figures = {name for name, _ in chart_files({"": on_verdict(samples.fixed_wing())}, "svg")}
+        assert taken["SVG"].name in {f"uav-corridor-mapping-{name}" for name in figures}
+        assert taken["PNG"].stem == taken["SVG"].stem
+        assert taken["CSV"].name == "uav-corridor-mapping-requirements.csv"
         drawing = ElementTree.parse(taken["SVG"]).getroot()
         assert "var(" not in taken["SVG"].read_text("utf-8")
         width, height = float(drawing.attrib["width"]), float(drawing.attrib["height"])
@@ -497,6 +502,29 @@ def test_figures_and_tables_can_be_taken_away(browser: Any, report: Path, tmp_pa
         assert {row[1] for row in rows[1:]} <= {"pass", "fail"}
         assert [url for url in opened.requests if not url.startswith("data:")] == [report.as_uri()]
         assert opened.console == []
+
+
+def test_a_figure_has_one_name_whatever_it_is_taken_away_as(browser: Any, tmp_path: Path) -> None:
+    """That of `--output svg`; what the page is about before it, cut where a word ends."""
+    path = tmp_path / "page.html"
+    verdict = samples.fixed_wing()
+    words = "Größte Drohne 2 <b>für</b> die Vermessung von Leitungen; " + "Trassen und Deiche " * 9
+    said = replace(on_verdict(verdict), name=words)
+    path.write_text(html(said), encoding="utf-8")
+    figures = {name for name, _ in chart_files({"": said}, "svg")}
+    about = "größte-drohne-2-b-für-b-die-vermessung-von-leitungen-trassen"
+    taken = set()
+    with Opened(browser, path, accept_downloads=True) as opened:
+        page = opened.page
+        page.evaluate("() => document.querySelectorAll('details').forEach(d => { d.open = true })")
+        for button in page.locator("figure .take button").all():
+            with page.expect_download() as waiting:
+                button.click()
+            taken.add(waiting.value.suggested_filename)
+    assert {name for name in taken if name.endswith(".svg")} == {f"{about}-{f}" for f in figures}
+    stems = {name.rpartition(".")[0] for name in taken}
+    assert stems == {Path(f"{about}-{name}").stem for name in figures}
+    assert any(name.endswith(".csv") for name in taken)
 
 
 @pytest.mark.parametrize("text", ["".join(samples.HOSTILE), samples.HOSTILE[0], samples.HOSTILE[7]])

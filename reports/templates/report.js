@@ -205,7 +205,22 @@
   document.querySelectorAll(".drawing[data-points]").forEach(tips);
 
   // To take away: figures as SVG and PNG, tables as CSV, made here from what the page holds.
-  function stem() { return document.title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60) || "report"; }
+  // Files are called after what the page is about and the name that `--output svg:FOLDER` gives a figure.
+  function fileName(text) {
+    var words = text.toLowerCase().match(/[\p{L}\p{M}\p{N}]+/gu) || [], name = "";
+    words.every(function (word) {
+      var longer = name ? name + "-" + word : word;
+      if (name && longer.length > 60) { return false; }
+      name = longer.slice(0, 60);
+      return true;
+    });
+    return name;
+  }
+
+  function called(part, kind) {
+    var about = fileName(document.querySelector("h1").textContent) || "report";
+    return (part ? about + "-" + part : about) + "." + kind;
+  }
 
   function save(blob, name) {
     var link = document.createElement("a");
@@ -296,18 +311,18 @@
   }
 
   document.querySelectorAll("figure").forEach(function (figure) {
-    var svg = figure.querySelector("svg"), name = (svg.getAttribute("aria-labelledby") || "figure").split(" ")[0].replace(/-title$/, "");
+    var svg = figure.querySelector("svg"), name = figure.dataset.name;
     var title = svg.querySelector("title").textContent;
     figure.querySelector(".beneath").prepend(offer([
-      ["SVG", title, function () { save(new Blob([alone(svg)], { type: "image/svg+xml" }), stem() + "-" + name + ".svg"); }],
-      ["PNG", title, function () { picture(svg, function (blob) { save(blob, stem() + "-" + name + ".png"); }); }]
+      ["SVG", title, function () { save(new Blob([alone(svg)], { type: "image/svg+xml" }), called(name, "svg")); }],
+      ["PNG", title, function () { picture(svg, function (blob) { save(blob, called(name, "png")); }); }]
     ]));
   });
   frames.forEach(function (frame) {
     var table = frame.querySelector("table"), title = frame.getAttribute("aria-label");
     var row = offer([["CSV", title, function () {
-      var name = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").slice(0, 50);
-      save(new Blob([csv(every(frame, table))], { type: "text/csv" }), stem() + "-" + name + ".csv");
+      var figure = frame.closest("figure"), name = figure ? figure.dataset.name : fileName(title);
+      save(new Blob([csv(every(frame, table))], { type: "text/csv" }), called(name, "csv"));
     }]]), before = frame.previousElementSibling;
     var over = before && /^H[23]$/.test(before.tagName) && table.querySelector("caption .unseen");
     row.classList.toggle("over", Boolean(over));
