@@ -239,6 +239,36 @@ def test_the_file_of_a_figure_holds_all_its_values(browser: Any, tmp_path: Path)
 
 
 @pytest.mark.browser
+@pytest.mark.parametrize("setting", ["73.66 m", "velodyne_hdl32e_ntp"])
+def test_a_hundred_and_fifty_cases_are_printed_on_six_sheets(
+    browser: Any, tmp_path: Path, setting: str
+) -> None:
+    """Of two factors: the payload has half of the width, whatever stands in the other columns."""
+    path = tmp_path / "page.html"
+    payload = "SBG Apogee, u-blox F9P with RTK corrections, Velodyne HDL-32E"
+    why = (
+        "MASS-1 and COST-1 cannot be met, each for itself. This would do: distance of uav from 9 m"
+    )
+    rows = [
+        (Cell(str(k), k), setting, "12.68 m/s", Cell("infeasible", mark="x", sub="COST-1, MASS-1"),
+         "59 862.35 EUR", "0.2265 m", (payload, why)[k % 2])
+        for k in range(1, 151)
+    ]  # fmt: skip
+    heads = ("Case #", "uav.ranging.sensor", "uav.v_max", "Verdict", "Price #", "Syncline error #",
+             "Payload, or why there is none")  # fmt: skip
+    path.write_text(page(*show(table("All cases", heads, rows))), "utf-8")
+    with Opened(browser, path) as opened:
+        sheets = opened.page.pdf(path=str(tmp_path / "page.pdf"), format="A4")
+        opened.page.set_viewport_size({"width": 688, "height": 900})  # as wide as such a sheet
+        opened.page.emulate_media(media="print")
+        width = "e => e.getBoundingClientRect().width"
+        whole = opened.page.eval_on_selector(".scroll table", width)
+        last = opened.page.eval_on_selector(".scroll tbody td:last-child", width)
+    assert 0.4 * whole < last < 0.6 * whole
+    assert len(re.findall(rb"/Type\s*/Page\b", sheets)) <= 6
+
+
+@pytest.mark.browser
 def test_a_table_that_would_just_be_cut_stands_closer(browser: Any, tmp_path: Path) -> None:
     """And apart again where there is room."""
     path = tmp_path / "page.html"
