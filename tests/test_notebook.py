@@ -69,7 +69,7 @@ def test_the_notebook_says_what_it_said(monkeypatch: pytest.MonkeyPatch) -> None
     codes = [cell for cell in book["cells"] if cell["cell_type"] == "code"]
     for cell, outputs in zip(codes, make.ran(codes), strict=True):
         assert [_said(one) for one in cell["outputs"]] == [_said(one) for one in outputs]
-    assert sum("text/html" in out.get("data", {}) for c in codes for out in c["outputs"]) == 3
+    assert sum("text/html" in out.get("data", {}) for c in codes for out in c["outputs"]) == 5
 
 
 def test_a_verdict_is_drawn_without_a_script_and_with_every_figure() -> None:
