@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -329,5 +330,7 @@ def test_a_plan_that_is_sharp_and_never_enough_says_why(
     monkeypatch.setattr(on_plan, "_shown", lambda _: [key])
     monkeypatch.setattr(on_plan, "_column_sizes", lambda _: {key: 1e-3})
     found = cast(Any, SimpleNamespace(reached=True))
-    row = on_plan._standard_row("straight", found, {key: sigma}, "", None, {key: 1e-3})
+    row = on_plan._standard_row(
+        "straight", found, {key: sigma}, "", Cell("", math.inf), {key: 1e-3}
+    )
     assert cast(Cell, row[1]).text == said
