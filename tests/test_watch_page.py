@@ -14,7 +14,7 @@ from browsing import flaws_of
 from html_page import Page
 from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_text
 from syncline_design.model.figure_text import format_estimate, format_interval
-from syncline_design.report.charts_watch import courses
+from syncline_design.report.charts_watch import courses, evidence
 from watched_series import (
     BOUND,
     LABELS,
@@ -75,6 +75,35 @@ def test_evidence_beyond_the_figure_is_told_as_it_is(spec: Path, tmp_path: Path)
     page = Page((tmp_path / "watch.html").read_text("utf-8"))
     assert "Drawn up to 1e+12" in page.text
     assert page.text.count(e_value_text(last)) >= 3  # headline, values of the figure, runs
+
+
+def evidence_of(*values: float | None) -> str:
+    runs = [cast(WatchedRun, SimpleNamespace(run=k, e_value=v)) for k, v in enumerate(values, 1)]
+    return evidence(runs, 20.0).svg.replace("\u00a0", " ")
+
+
+@pytest.mark.parametrize("last", [3.4e15, 1e204, 1e300])
+def test_the_spoken_evidence_is_that_of_the_last_run_not_of_the_drawn_end(last: float) -> None:
+    spoken = re.findall(r"<desc[^>]*>([^<]*)<", evidence_of(None, 0.5, 1e13, last))[0]
+    assert spoken.startswith(f"{e_value_text(last)} after run 4, alarm from 20 on")
+    assert spoken.endswith("; 2 runs above the drawn range")
+
+
+def test_a_run_above_the_drawn_range_has_a_mark_of_its_own() -> None:
+    """At the end of the range, 1e12, is a run still drawn where it belongs."""
+    within, beyond = evidence_of(None, 0.5, 1e12), evidence_of(None, 0.5, 1.01e12)
+    assert "above the drawn range" not in within
+    assert "; 1 run above the drawn range" in beyond
+    assert beyond.count("<use ") == within.count("<use ") + 1
+
+
+def test_one_parameter_and_one_run_are_spoken_of_as_one() -> None:
+    value = RunValue("tilt", "attitude", "usv", "gain", 1e-4, 2e-4, (-3e-4, 5e-4))
+    one = cast(WatchedRun, SimpleNamespace(run=1, values=[value]))
+    two = cast(WatchedRun, SimpleNamespace(run=2, values=[value]))
+    keys = [("tilt", "attitude", "usv", "gain")]
+    assert ">1 parameter over 1 run; " in courses([one], keys, {}).svg.replace("\u00a0", " ")
+    assert ">1 parameter over 2 runs; " in courses([one, two], keys, {}).svg.replace("\u00a0", " ")
 
 
 def test_courses_have_the_digits_of_their_uncertainty(spec: Path, tmp_path: Path) -> None:

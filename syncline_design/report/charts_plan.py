@@ -56,9 +56,11 @@ def path(run: PlanRun) -> InlineChart:
         from_above(axes)
 
     wide, high = float(np.ptp(east)), float(np.ptp(north))
+    legs = numbers.counted(len(run.result.legs), "leg")
+    targets = numbers.counted(len(run.result.targets), "target")
     spoken = (
-        f"{len(run.result.legs)} legs over {numbers.length(wide, 3)} east to west and "
-        f"{numbers.length(high, 3)} north to south, {len(run.result.targets)} targets"
+        f"{legs} over {numbers.length(wide, 3)} east to west and "
+        f"{numbers.length(high, 3)} north to south, {targets}"
     )
     return draw("fig-path", "Path from above", spoken, (WIDTH, 340.0), build)
 

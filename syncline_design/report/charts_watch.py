@@ -33,13 +33,15 @@ SINGLE: Final = 100  # runs up to which each has a mark of its own
 
 def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
     """E-values over the runs in the order in which they are compared, logarithmic; of those beyond
-    MOST the place is that of MOST, the words are their own."""
+    MOST the place is that of MOST with a triangle that points up, the words are their own."""
     numbers_of, places = [r.run for r in runs], range(len(runs))
+    beyond = [place for place, r in enumerate(runs) if (r.e_value or 0.0) > MOST]
     values = [min(max(r.e_value or 0.0, 1e-3), MOST) for r in runs]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         axes.plot(places, values, marker="o", markersize=3.5, color=SERIES[0])
+        axes.plot(beyond, [MOST] * len(beyond), "^", markersize=7.0, color=SERIES[0])
         for place, run, value in zip(places, runs, values, strict=True):
             told = e_value_text(run.e_value or 0.0)
             tell(axes, place, value, [("Run", str(run.run)), ("e-value", told)])
@@ -54,10 +56,15 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
         scales.grid(axes, "y")
 
     spoken = (
-        f"{e_value_text(values[-1])} after run {numbers_of[-1]}, alarm from "
-        f"{numbers.number(threshold, 3)} on"
+        f"{e_value_text(runs[-1].e_value or 0.0)} after run {numbers_of[-1]}, alarm from "
+        f"{numbers.number(threshold, 3)} on{_beyond_words(len(beyond))}"
     )
     return draw("fig-evidence", "Evidence for a change", spoken, (WIDTH, 220.0), build)
+
+
+def _beyond_words(count: int) -> str:
+    """What the alternative text says of runs whose evidence lies above the drawn range."""
+    return f"; {numbers.counted(count, 'run')} above the drawn range" if count else ""
 
 
 def _e_value_tick(value: float) -> str:
@@ -80,7 +87,8 @@ def courses(
             _panel(axes, runs, key, since.get(key, ()), many=across > 1)
 
     changed = ", ".join(f"{e} ({s})" for e, s, *_ in since) or "none"
-    spoken = f"{len(keys)} parameters over {len(runs)} runs; changed: {changed}"
+    counts = f"{numbers.counted(len(keys), 'parameter')} over {numbers.counted(len(runs), 'run')}"
+    spoken = f"{counts}; changed: {changed}"
     height = HEIGHT * rows + (30.0 if across > 1 else 90.0)
     return draw(name, "Effects over the runs", spoken, (WIDTH, height), build)  # fmt: skip
 

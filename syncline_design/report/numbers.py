@@ -179,6 +179,11 @@ def count(value: Any) -> str:
     return MISSING if amount is None else f"{amount:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
 
 
+def counted(some: int, noun: str) -> str:
+    """`1 leg`, `12 legs`."""
+    return f"{count(some)}\N{NO-BREAK SPACE}{noun}{'' if some == 1 else 's'}"
+
+
 def share_of(some: int, whole: int) -> str:
     """`1 608 of 4 000`, which no line tears."""
     return f"{count(some)}\N{NO-BREAK SPACE}of\N{NO-BREAK SPACE}{count(whole)}"

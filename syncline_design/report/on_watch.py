@@ -323,7 +323,7 @@ def _evidence(found: Watch) -> list[Node]:
         return []
     caption = "E-value after each run since the baseline; an alarm from the dashed line on."
     if max(r.e_value or 0.0 for r in runs) > drawings.MOST:
-        caption += f" Drawn up to {numbers.number(drawings.MOST, 3)}."
+        caption += f" Drawn up to {numbers.number(drawings.MOST, 3)}; a triangle stands for more."
     return [Chart("evidence", partial(drawings.evidence, runs, found.rule.threshold), caption)]
 
 
