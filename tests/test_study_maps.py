@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import random
 import re
-from dataclasses import replace
+import time
+from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_DOWN, ROUND_HALF_UP, Context, Decimal
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import pytest
 from browsing import Opened
 from study_specs import SPEC, write
 from syncline_design.report.charts_along import over_key
+from syncline_design.report.charts_cells import _outline
 from syncline_design.report.charts_study import cost_map, sampled_cases
 from syncline_design.report.on_study import _common, on_study
 from syncline_design.report.render_console import console
@@ -27,9 +29,11 @@ from syncline_design.report.study_words import (
     short_key,
     winners_table,
 )
+from syncline_design.spec.keys import label
 from syncline_design.studies import StudyResult, StudySettings, run_study
+from syncline_design.studies.loading import Study, load_study
 from syncline_design.studies.scatter import along, scatter
-from syncline_design.studies.summary import HeatMap, heat_map, summarise
+from syncline_design.studies.summary import Brief, HeatMap, StudySummary, heat_map, summarise
 
 SAMPLE = """\
 study: 1
@@ -331,6 +335,123 @@ def test_a_cell_says_of_its_price_and_of_none_what_they_rest_on(tmp_path: Path) 
     told = {t.says["Least cost"] for t in cost_map(heat).told}
     assert {"cannot be as combined", "not known: a case got no verdict"} <= told
     assert any("with a waived requirement missed" in text for text in told)
+
+
+DISTANCE, LIMIT = '"stages[uav].distance"', '"requirements[ACC-1].limit"'
+
+
+def summary_of(folder: Path, *keys: str, more: str = "") -> StudySummary:
+    """The summary of a grid as it would be, without a case computed: each meets at its price."""
+    rows = "".join(f"  {key}\n" for key in keys)
+    text = f"study: 1\nname: Grid\nbase: [spec.yaml]\ngrid:\n{rows}{more}meets_when: decided\n"
+    study = load_study(write(folder, text, NARROW))
+    briefs = tuple(
+        Brief(k + 1, base, tuple(label(value) for _, value in settings), "meets", 1e3 + k, "EUR",
+              0.1, ())
+        for k, (base, settings) in enumerate(map(study.case, range(len(study))))
+    )  # fmt: skip
+    result = Computed(study)
+    return StudySummary(result, briefs, ())  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Computed:
+    """Of a finished study what its maps ask for."""
+
+    study: Study
+
+
+@pytest.mark.parametrize(("across", "up"), [(41, 3), (41, 41), (100, 100), (3, 200)])
+def test_a_grid_of_two_keys_is_a_map_however_fine(tmp_path: Path, across: int, up: int) -> None:
+    heat = heat_map(summary_of(tmp_path, f"{DISTANCE}: {{low: 30 m, high: 140 m, count: {across}}}",
+                               f"{LIMIT}: {{low: 0.05 m, high: 0.5 m, count: {up}}}"))  # fmt: skip
+    assert heat is not None
+    assert (len(heat.x_values), len(heat.y_values)) == (across, up)
+    assert heat.least_cost == tuple(
+        tuple(1e3 + up * x + y for x in range(across)) for y in range(up)
+    )
+
+
+def test_the_factors_of_a_map_are_those_that_had_one_before(tmp_path: Path) -> None:
+    """Of 60, 3 and 2 values those of 3 and 2; only where these are no two, the finer ones."""
+    fine = f"{DISTANCE}: {{low: 30 m, high: 140 m, count: 60}}"
+    few = f"{LIMIT}: [0.1 m, 0.2 m, 0.3 m]", "coverage_factor: [1, 2]"
+    heat = heat_map(summary_of(tmp_path, fine, *few))
+    assert heat is not None
+    assert (heat.x, heat.y) == ("requirements[ACC-1].limit", "coverage_factor")
+    heat = heat_map(summary_of(tmp_path, fine, few[0]))
+    assert heat is not None
+    assert (heat.x, heat.y) == ("stages[uav].distance", "requirements[ACC-1].limit")
+    many = f"{DISTANCE}: {{low: 30 m, high: 140 m, count: 201}}"
+    assert heat_map(summary_of(tmp_path, many, few[0])) is None
+
+
+def test_a_fine_map_tells_every_cell_in_few_elements() -> None:
+    """100 x 100: areas of the paths of each look, from their corners, against its cells."""
+    heat = drawn_map(100, 100)
+    start = time.process_time()
+    drawn = cost_map(heat)
+    assert time.process_time() - start < 10.0
+    assert len(drawn.told) == 10_000
+    assert {tip.says["Least cost"] for tip in drawn.told} >= {"no case is known to meet"}
+    assert drawn.svg.count("<path") < 200
+    assert len(drawn.svg) < 1_000_000
+    assert "\u2715" not in drawn.svg
+    empty = sum(cost is None for row in heat.least_cost for cost in row)
+    assert f"no case meets ({empty:,})".replace(",", "\u00a0") in drawn.svg
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_outline_of_cells_covers_them_and_no_other(seed: int) -> None:
+    drawn = random.Random(seed)
+    every = [(x, y) for x in range(9) for y in range(7)]
+    chosen = drawn.sample(every, 30)
+    outline = _outline(chosen)
+    inside = [cell for cell in every if outline.contains_point(cell)]
+    assert sorted(inside) == sorted(chosen)
+    corners = outline.vertices.reshape(-1, 5, 2)  # of rectangles, the first corner twice
+    assert sum((c[2] - c[0]).prod() for c in corners) == len(chosen)
+
+
+@pytest.mark.parametrize(
+    ("values", "log"),
+    [
+        ("{low: 1 m, high: 140 m, count: 100}", False),
+        ("{low: 1 m, high: 140 m, count: 9, scale: log}", True),
+        ("{low: 30 m, high: 140 m, count: 5, scale: log}", True),
+        ("[1 m, 10 m, 100 m]", True),
+        ("[1 m, 3 m, 10 m, 30 m]", True),
+        ("[1 m, 100 m]", False),
+        ("[1 m, 2 m, 140 m]", False),
+        ("[100 m, 101 m, 102 m]", False),
+    ],
+)
+def test_an_axis_is_logarithmic_where_its_values_were_spaced_so(
+    tmp_path: Path, values: str, log: bool
+) -> None:
+    data = along(summary_of(tmp_path, f"{DISTANCE}: {values}"))
+    assert data is not None
+    assert data.axis.log is log
+
+
+def test_a_sample_is_logarithmic_only_where_it_says_so(tmp_path: Path) -> None:
+    """1 to 140 m drawn evenly: linear, whatever the ratio of the ends; speeds as they say."""
+    text = SAMPLE.format(count=6, more="").replace("30 m .. 140 m", "1 m .. 140 m")
+    found = scatter(summarise(done(tmp_path, text)))
+    assert found is not None
+    assert (found.x.log, found.y.log) == (False, True)
+    drawn = sampled_cases(found, "EUR").svg
+    assert ">Sampled cases over two factors<" in drawn
+    assert "6 sampled cases meet" in drawn
+
+
+def test_a_grid_that_is_drawn_as_points_is_not_called_sampled(tmp_path: Path) -> None:
+    found = scatter(summary_of(tmp_path, f"{DISTANCE}: {{low: 30 m, high: 140 m, count: 201}}",
+                               f"{LIMIT}: [0.1 m, 0.2 m]"))  # fmt: skip
+    assert found is not None
+    drawn = sampled_cases(found, "EUR").svg
+    assert ">Cases over two factors<" in drawn
+    assert "sampled" not in drawn.lower().replace("fig-sampled", "")
 
 
 @pytest.mark.browser

@@ -14,7 +14,7 @@ from syncline_design.report.study_words import COMBINED, short_key
 from syncline_design.report.svg import InlineChart, draw, tell
 from syncline_design.report.text import shortened
 from syncline_design.report.words import BRIEF
-from syncline_design.studies.scatter import LOG_SPAN, KeySweep
+from syncline_design.studies.scatter import KeySweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Fill = Literal["full", "left", "none"]  # of a mark
 Says = Sequence[Sequence[tuple[str, str]]]  # of every case: labels and values
 SHAPES: Final = "osD^"
+LOG_SPAN: Final = 30.0  # times the smallest error: beyond it their axis is logarithmic
 EDGE: Final = 0.16  # of a panel, for cases without a design
 MOST_LABEL: Final = 22  # letters of an entry of the legend beside another
 MOST_WORD: Final = 22  # letters of a word beside its row

@@ -13,12 +13,14 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import WIDTH
+from syncline_design.report.charts_cells import MOST_BESIDE, CellLook, draw_cells, explain_cells
 from syncline_design.report.palette import BAD, GRID, INK, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.study_words import (
     COMBINED,
     UNPRICED,
     WAIVED_SIGN,
     cell_word,
+    rounded,
     short_key,
 )
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
@@ -42,51 +44,70 @@ _UNPRICED = {
     "refused": COMBINED,
 }
 _WAIVED = ", with a waived requirement missed"
-MOST_BESIDE = 22  # characters of a label with another beside it, that a phone holds
 MOST_LABEL = 44  # characters of a front's in a legend
 MOST_TEXT = 8  # cells across in which the cost itself still fits
+MOST_SIGNS = 24  # cells across, and rows, in which a sign still fits: a map of more is a fine one
 PATCH = 24.0  # of the scale, with what is around it [SVG units]
 ACROSS = 262.0  # all cells, beside the labels of the rows [SVG units]
 
 
 def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
-    """Heat map of the least cost over two factors; a cross where no case meets."""
+    """Heat map of the least cost over two factors; a cross, or a hatch, where no case meets."""
     costs = [cost for row in heat.least_cost for cost in row if cost is not None]
     across = len(heat.x_values)
     whole = _room(costs) <= ACROSS / across or across > MOST_TEXT
+    fine = is_fine(heat)
+    ends = sorted(costs)[:: max(1, len(costs) - 1)]  # the cheapest and the dearest
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
+        looks: dict[CellLook, list[tuple[int, int]]] = {}
         for y, row in enumerate(heat.least_cost):
             for x, cost in enumerate(row):
                 word = cell_word(heat, x, y)
-                words = _amount(cost or 0.0, whole) if across <= MOST_TEXT else ""
-                words += f" {WAIVED_SIGN}" if word == "waived" else ""
-                _cell(axes, (x, y), word, cost, costs, words.strip())
+                if fine:
+                    looks.setdefault(_look(word, cost, ends), []).append((x, y))
+                else:
+                    words = _amount(cost or 0.0, whole) if across <= MOST_TEXT else ""
+                    words += f" {WAIVED_SIGN}" if word == "waived" else ""
+                    _cell(axes, (x, y), word, cost, costs, words.strip())
                 tell(axes, (x - 0.5, x + 0.5), (y - 0.5, y + 0.5), [
                     (short_key(heat.x), heat.x_values[x]), (short_key(heat.y), heat.y_values[y]),
                     ("Least cost", _UNPRICED.get(word, "") if cost is None
                      else numbers.money(cost, heat.currency) + _WAIVED * (word == "waived")),
                     ("Payload", heat.payload[y][x]),
                 ])  # fmt: skip
+        draw_cells(axes, looks)
         axes.set_xlim(-0.5, len(heat.x_values) - 0.5)
         axes.set_ylim(-0.5, len(heat.y_values) - 0.5)
-        _label_axis(axes, "x", heat.x_values)
-        _label_axis(axes, "y", heat.y_values)
+        _label_axis(axes, "x", heat.x_values, fine)
+        _label_axis(axes, "y", heat.y_values, fine)
         axes.set_xlabel(shortened(short_key(heat.x), 60))
         axes.set_ylabel(shortened(short_key(heat.y), 40))
-        _cost_scale(figure, costs, heat.currency, whole)
+        _cost_scale(figure, costs, heat.currency, whole, MARK if fine else CELL)
+        explain_cells(figure, looks)
 
     spoken = "No case meets its requirements."
     if costs:
         spoken = (
             f"Least cost from {numbers.money(min(costs), heat.currency)} to "
-            f"{numbers.money(max(costs), heat.currency)} in {len(costs)} of "
-            f"{len(heat.x_values) * len(heat.y_values)} cells; in the others no case is known to "
-            "meet."
+            f"{numbers.money(max(costs), heat.currency)} in "
+            f"{numbers.share_of(len(costs), across * len(heat.y_values))} cells; in the others no "
+            "case is known to meet."
         )
     height = 140.0 + 30.0 * min(len(heat.y_values), 14)
     return draw(name, "Least cost over two factors", spoken, (WIDTH, height), build)
+
+
+def is_fine(heat: HeatMap) -> bool:
+    """Whether its cells are too small for a sign in them."""
+    return max(len(heat.x_values), len(heat.y_values)) > MOST_SIGNS
+
+
+def _look(word: CellWord, cost: float | None, ends: Sequence[float]) -> CellLook:
+    if cost is None:
+        return CellLook(word, None)
+    return CellLook(word, round(_strength(cost, ends, MARK) / STEP) * STEP)
 
 
 def _cell(
@@ -122,15 +143,21 @@ def _room(costs: Sequence[float]) -> float:
     return scales.LETTER * max((len(numbers.count(cost)) for cost in costs), default=0)
 
 
-def _label_axis(axes: Axes, which: str, labels: Sequence[str]) -> None:
+def _label_axis(
+    axes: Axes, which: Literal["x", "y"], labels: Sequence[str], fine: bool
+) -> None:  # fmt: skip
+    """Values beside their cells; along a fine map as many as have room, to four figures."""
     step = max(1, -(-len(labels) // (7 if which == "x" else 14)))
     places = list(range(0, len(labels), step))
-    shown = [shortened(labels[place], 16) for place in places]
-    if which == "x":
-        axes.set_xticks(places, shown)
+    shown = {place: shortened(labels[place], 16) for place in places}
+    if fine:
+        shown = {place: shortened(rounded(labels[place]), 16) for place in places}
+        scales.set_ticks(axes, which, places, lambda place: shown[round(place)], ACROSS)
+    elif which == "x":
+        axes.set_xticks(places, list(shown.values()))
     else:
-        axes.set_yticks(places, shown)
-    axes.tick_params(axis="x" if which == "x" else "y", length=0)
+        axes.set_yticks(places, list(shown.values()))
+    axes.tick_params(axis=which, length=0 if not fine else 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +244,10 @@ _VERDICTS = (  # verdicts, marker, colour, word
 def sampled_cases(
     data: Scatter, currency: str, says: Says = (), name: str = "fig-sampled"
 ) -> InlineChart:
-    """Cases over two factors: filled ones meet, the stronger the dearer; crosses do not."""
+    """Cases over two factors: filled ones meet, the stronger the dearer; crosses do not.
+
+    Called sampled only where they were drawn.
+    """
     meeting = [point for point in data.points if point.verdict == "meets"]
     costs = [point.cost for point in meeting if point.cost is not None]
     size = max(LEAST_MARK, min(1.0, (FEW / max(len(data.points), 1)) ** 0.5))
@@ -239,11 +269,12 @@ def sampled_cases(
         told = max((len(words) for words in axes.get_legend_handles_labels()[1]), default=0)
         figure.legend(loc="outside lower left", ncols=2 if told <= MOST_BESIDE else 1)
 
-    spoken = (
-        f"{numbers.share_of(len(meeting), len(data.points))} sampled cases meet their requirements."
-    )
+    cases = "sampled cases" if data.sampled else "cases"
+    met = numbers.share_of(len(meeting), len(data.points))
+    spoken = f"{met} {cases} meet their requirements."
     height = 360.0 if not data.y.words else 190.0 + 40.0 * len(data.y.words)
-    return draw(name, "Sampled cases over two factors", spoken, (WIDTH, height), build)
+    title = f"{cases[0].upper()}{cases[1:]} over two factors"
+    return draw(name, title, spoken, (WIDTH, height), build)
 
 
 def _meeting(
@@ -252,8 +283,9 @@ def _meeting(
 ) -> None:  # fmt: skip
     """Cases that meet: a shape for each value of what else varies, all of one strength at once."""
     groups: dict[tuple[int, float], list[ScatterPoint]] = {}
+    ends = sorted(costs)[:: max(1, len(costs) - 1)]
     for point in meeting:
-        strength = round(_strength(point.cost, costs, MARK) / STEP) * STEP
+        strength = round(_strength(point.cost, ends, MARK) / STEP) * STEP
         groups.setdefault((point.kind, strength), []).append(point)
     for (kind, strength), points in groups.items():
         places = [p.x for p in points], [p.y for p in points]

@@ -106,11 +106,13 @@ def _heat(summary: StudySummary) -> list[Node]:
     if heat is None:
         return []
     shown = heat_table(heat)
+    fine = charts_study.is_fine(heat)
+    sign = "Hatched" if fine else "A cross"
     caption = (
         "Least cost of a payload that meets the requirements; the stronger the colour, the dearer. "
-        "A cross: computed, and no case is known to meet."
+        f"{sign}: computed, and no case is known to meet."
     )
-    caption = f"{caption} {cell_notes(heat)}".strip()
+    caption = f"{caption} {cell_notes(heat, signs=not fine)}".strip()
     if least := _collapsed(summary, heat):
         caption, shown = f"{caption} {least}", replace(shown, note=f"{shown.note} {least}".strip())
     short = show(shown, silent=True, reach="text")
@@ -131,7 +133,7 @@ def _collapsed(summary: StudySummary, heat: HeatMap) -> str:
 
 
 def _sampled(summary: StudySummary) -> list[Section]:
-    """Cases drawn over two factors, where these are no grid or too fine a one for a map."""
+    """Cases over two factors, where these are no grid or too fine a one for a map."""
     currency, *others = summary.currencies
     if others or heat_map(summary) is not None:
         return []
@@ -146,9 +148,8 @@ def _sampled(summary: StudySummary) -> list[Section]:
         return charts_study.sampled_cases(found, currency, says)
 
     title = f"Cases over {visible(short_key(found.x.key))} and {visible(short_key(found.y.key))}"
-    return section(
-        "sampled", title, [Chart("sampled", draw, _sampled_caption(found))], "Map of cases"
-    )
+    name = "sampled" if found.sampled else "plane"
+    return section(name, title, [Chart(name, draw, _sampled_caption(found))], "Map of cases")
 
 
 def _along_heading(summary: StudySummary) -> str:

@@ -162,17 +162,17 @@ def heat_table(heat: HeatMap) -> Table:
     return table(LEAST_COST, heads, rows, cell_notes(heat))
 
 
-def cell_notes(heat: HeatMap) -> str:
-    """What the signs in cells say, where there are any."""
-    words = {word for line in heat.cells or () for word in line}
+def cell_notes(heat: HeatMap, *, signs: bool = True) -> str:
+    """What the signs in cells say, where there are any; and what is not known."""
+    words = {word for line in heat.cells or () for word in line if signs}
     told = []
     if "waived" in words:
         told.append(f"{WAIVED_SIGN}: with a waived requirement missed.")
     if "refused" in words:
         told.append(f"\N{EN DASH}: {COMBINED}.")
     if heat.undecided:
-        many = "cell" if heat.undecided == 1 else "cells"
-        told.append(f"In {heat.undecided} {many} a case got no verdict: what costs less may meet.")
+        many = "1 cell" if heat.undecided == 1 else f"{numbers.count(heat.undecided)} cells"
+        told.append(f"In {many} a case got no verdict: what costs less may meet.")
     return " ".join(told)
 
 
@@ -186,7 +186,7 @@ def _cell_table(heat: HeatMap) -> Table:
     ]
     left = len(heat.x_values) * len(heat.y_values) - len(rows)
     more = max(0, len(rows) - MOST_ROWS)
-    note = f"In {left} cells no case meets." if left else ""
+    note = f"In {numbers.count(left)} cells no case meets." if left else ""
     note += f" {numbers.count(more)} further rows are left out." if more else ""
     note += f" {cell_notes(heat)}"
     heads = (short_key(heat.y), short_key(heat.x), "Least cost #", "Payload")
@@ -222,7 +222,12 @@ def shown_value(factor: Factor, label: str) -> str:
 
     Shares and amounts of money stay as they are.
     """
-    found = figure_of(plain_scalar(label)) if factor.origin == "sample" else None
+    return rounded(label) if factor.origin == "sample" else label
+
+
+def rounded(label: str) -> str:
+    """A value to four figures; shares, amounts of money and words as they are."""
+    found = figure_of(plain_scalar(label))
     if found is None or found[1].isupper() or "%" in label:
         return label
     return numbers.like(label, found[0])

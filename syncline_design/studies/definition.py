@@ -153,6 +153,7 @@ class Factor:
     origin: Literal["grid", "sample"]
     place: tuple[str | int, ...]  # where the study file lists them
     listed: bool = True  # each value has its own place in the file
+    scale: Scale = "linear"  # of the range that they come from
 
     @cached_property
     def axis(self) -> tuple[str, ...]:
@@ -234,6 +235,12 @@ def span_of(value: Any) -> ValueSpan | None:
             raise FactorError("not a scale", "linear or log", kind_of(scale), ("scale",))
         return _span(value["low"], value["high"], scale)
     return None
+
+
+def scale_of(value: Any) -> Scale:
+    """How the values of a range lie; of a list, which has no scale: linear."""
+    span = span_of(value)
+    return "linear" if span is None else span.scale
 
 
 def _bound(text: str) -> Any:

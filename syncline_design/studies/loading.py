@@ -33,6 +33,7 @@ from syncline_design.studies.definition import (
     StudyFile,
     grid_values,
     sample_values,
+    scale_of,
 )
 
 
@@ -158,7 +159,7 @@ def _grid(chosen: StudyFile, document: ParsedFile, problems: list[Flaw]) -> Iter
             problems.append(_factor_problem(document, place, error))
             continue
         combinations *= len(values)
-        yield Factor(key, values, "grid", place, listed)
+        yield Factor(key, values, "grid", place, listed, scale_of(value))
     if combinations > MAX_CASES:
         found = f"{combinations} cases"
         problems.append(problem_at(document, (), "too many cases", f"at most {MAX_CASES}", found))
@@ -174,7 +175,7 @@ def _sample(chosen: StudyFile, document: ParsedFile, problems: list[Flaw]) -> It
         except FactorError as error:
             problems.append(_factor_problem(document, place, error))
             continue
-        yield Factor(key, values, "sample", place, listed=False)
+        yield Factor(key, values, "sample", place, listed=False, scale=scale_of(value))
 
 
 def _factor_problem(document: ParsedFile, place: KeyPath, error: FactorError) -> Flaw:

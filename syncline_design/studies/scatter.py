@@ -1,6 +1,9 @@
-"""A sampled study as points over two factors: only what was computed, nothing in between."""
+"""A study as points over two factors: only what was computed, nothing in between."""
 
 from __future__ import annotations
+
+import math
+from itertools import pairwise
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.yaml_text import plain_scalar
@@ -8,7 +11,8 @@ from syncline_design.studies.definition import Factor
 from syncline_design.studies.summary import StudySummary, varied
 
 MOST_KINDS = 4  # values of a further factor that shapes can tell apart
-LOG_SPAN = 30.0  # an axis whose ends differ by more than this factor is logarithmic
+ALIKE = 0.1  # of ratios of neighbours, in their logarithms: no more apart are equal ratios
+LEVEL = 0.01  # of steps: no more apart are equal steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +44,7 @@ class ScatterPoint:
 class Scatter:
     """Every case of a study in the plane of two factors; others: what varies besides.
 
-    kinds: the values of that, where it is one factor with a few.
+    kinds: the values of that, where it is one factor with a few.  sampled: the cases were drawn.
     """
 
     x: ScatterAxis
@@ -48,6 +52,7 @@ class Scatter:
     points: tuple[ScatterPoint, ...]
     others: tuple[str, ...]
     kinds: tuple[str, ...] = ()
+    sampled: bool = False
 
 
 def scatter(summary: StudySummary) -> Scatter | None:
@@ -73,7 +78,8 @@ def scatter(summary: StudySummary) -> Scatter | None:
         )
         for brief in summary.briefs
     )
-    return Scatter(x, y, points, tuple(f.key for _, f in others), kinds)
+    drawn = bool(summary.result.study.sample)
+    return Scatter(x, y, points, tuple(f.key for _, f in others), kinds, drawn)
 
 
 def _kinds(others: list[tuple[int, Factor]]) -> tuple[str, ...]:
@@ -111,8 +117,18 @@ def _axis(factor: Factor) -> ScatterAxis:
     if not figures:
         return ScatterAxis(factor.key, words=values)
     numbers = [float(text.partition(" ")[0]) for text in values]
-    low, high = min(numbers), max(numbers)
-    return ScatterAxis(factor.key, unit, log=low > 0.0 and high > LOG_SPAN * low)
+    return ScatterAxis(factor.key, unit, log=_is_log(factor, sorted(numbers)))
+
+
+def _is_log(factor: Factor, numbers: list[float]) -> bool:
+    """Whether the values were spaced by ratios: the study says so, or those of its grid show it."""
+    if factor.scale == "log":
+        return True
+    if numbers[0] <= 0.0 or factor.origin == "sample" or len(numbers) < 3:
+        return False
+    ratios = [math.log(b / a) for a, b in pairwise(numbers)]
+    steps = [b - a for a, b in pairwise(numbers)]
+    return max(ratios) <= (1.0 + ALIKE) * min(ratios) and max(steps) > (1.0 + LEVEL) * min(steps)
 
 
 def _place(axis: ScatterAxis, text: str) -> float:

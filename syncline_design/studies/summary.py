@@ -15,7 +15,8 @@ from syncline_design.studies.record import CasePoint, CaseWord, RolePick
 from syncline_design.verdict.tree import RequirementResult
 
 MOST_FRONTS = 500
-MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
+MOST_CELLS = 40  # values per axis of a heat map
+MOST_FINE = 200  # the same where all are of a grid, and what has a map of MOST_CELLS has not two
 
 CellWord = Literal["meets", "waived", "none", "undecided", "refused"]
 Shown = Callable[[Factor, str], str]  # a value of a factor as it is to be written
@@ -188,10 +189,17 @@ def heat_map(summary: StudySummary) -> HeatMap | None:
     else:
         several = sorted((f for _, f in varied(summary)), key=lambda f: f.origin != "grid")
         chosen = [f for f in several if len(f.axis) <= MOST_CELLS][:2]
-    if len(chosen) < 2 or any(len(f.axis) > MOST_CELLS for f in chosen):
+        if len(chosen) < 2:  # of more values, which are drawn without signs
+            chosen = [f for f in several if len(f.axis) <= _most_values(f)][:2]
+    if len(chosen) < 2 or any(len(f.axis) > _most_values(f) for f in chosen):
         return None
     x, y = chosen
     return _filled(summary, x, y) if _covered(summary, x, y) else None
+
+
+def _most_values(factor: Factor) -> int:
+    """Along an axis of a map; many drawn values are told better by points where they lie."""
+    return MOST_FINE if factor.origin == "grid" else MOST_CELLS
 
 
 def _covered(summary: StudySummary, x: Factor, y: Factor) -> bool:
