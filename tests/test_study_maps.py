@@ -398,6 +398,11 @@ def test_a_fine_map_tells_every_cell_in_few_elements() -> None:
     assert len(drawn.svg) < 1_000_000
     assert "\u2715" not in drawn.svg
     empty = sum(cost is None for row in heat.least_cost for cost in row)
+    grounds = re.findall(r"<pattern .*?</pattern>", drawn.svg)
+    assert grounds
+    for pattern in grounds:  # lines in the colour of the theme, on no ground that hides them
+        assert re.search(r'<rect [^>]*fill="none"', pattern)
+        assert "stroke: var(--bad)" in pattern
     assert f"no case meets ({empty:,})".replace(",", "\u00a0") in drawn.svg
 
 

@@ -64,7 +64,6 @@ def explain_cells(figure: Figure, cells: Cells) -> None:
 
 def _patches(look: CellLook, outline: Path) -> list[Patch]:
     """The fill of a price, and a hatch where the cells say more than that."""
-    from matplotlib.colors import to_rgba
     from matplotlib.patches import PathPatch
 
     found: list[Patch] = []
@@ -72,8 +71,10 @@ def _patches(look: CellLook, outline: Path) -> list[Patch]:
         found.append(PathPatch(outline, facecolor=SERIES[0], alpha=look.strength, linewidth=0))
     if look.word in _HATCHED:
         colour, hatch, _ = _HATCHED[look.word]
-        under = "none" if look.word == "waived" else to_rgba(colour, UNDER)
-        found.append(PathPatch(outline, facecolor=under, edgecolor=colour, hatch=hatch,
+        if look.word != "waived":
+            found.append(PathPatch(outline, facecolor=colour, alpha=UNDER, linewidth=0))
+        # of its own: an SVG's hatch over a ground loses how faint that ground is
+        found.append(PathPatch(outline, facecolor="none", edgecolor=colour, hatch=hatch,
                                linewidth=0))  # fmt: skip
     return found
 
