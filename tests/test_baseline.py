@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import date
 from pathlib import Path
 from typing import cast
 from xml.etree import ElementTree
@@ -364,3 +365,18 @@ def test_a_baseline_is_not_overwritten(tmp_path: Path) -> None:
     assert code == 2
     assert "read by this command" in said
     assert old.read_text(encoding="utf-8") == text
+
+
+def test_a_verdict_that_depends_on_the_day_says_which(tmp_path: Path) -> None:
+    """By provenance alone the same figures come again: a waiver ends, so its day belongs there."""
+    waiver = "kind: accuracy, waiver: {reason: until the wire, expires: 2027-01-31}"
+    path = tmp_path / "own.yaml"
+    path.write_text(changed(FAILING, (KIND, waiver)), encoding="utf-8")
+    for day in (date(2027, 1, 31), date(2027, 2, 1)):
+        found = sd.check(path, monte_carlo=False, today=day)
+        assert isinstance(found, Verdict)
+        assert found.provenance.judged_on == day.isoformat()
+        assert f"waivers judged on {day.isoformat()}" in console(on_verdict(found))
+    plain = verdict_of(tmp_path, FAILING)
+    assert plain.provenance.judged_on is None
+    assert "judged_on" not in plain.provenance.to_json()

@@ -157,7 +157,7 @@ def _checked(case: Case, settings: CheckSettings) -> _Checked:
         return _Checked(check_loaded(case, settings))
     except NoBudget as refused:
         words = tuple(f"{one.message}; {one.hint}" for one in refused.problems)
-        return _Checked(framed("indeterminate", case, build_problem(case), settings.seed), words)
+        return _Checked(framed("indeterminate", case, build_problem(case), settings), words)
 
 
 def _summary(verdict: Verdict) -> Summary:

@@ -365,5 +365,7 @@ def _provenance(verdict: Verdict) -> list[Section]:
         f"syncline-design {found.version}, spec {found.spec_sha256[:12]}, "
         f"catalogs {found.catalogs_sha256[:12]}, seed {found.seed}"
     )
+    if found.judged_on:
+        line = f"{line}, waivers judged on {found.judged_on}"
     short = section("made-by", "Provenance", [Text(line)], reach="text")
     return [*provenance(full), *short]

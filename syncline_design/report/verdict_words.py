@@ -309,4 +309,5 @@ def pinned_by(found: Provenance) -> list[tuple[str, str]]:
         *pins(found.version, found.spec_sha256, found.catalogs_sha256, found.seed),
         ("Python", found.python),
         ("NumPy", found.numpy),
+        *([("Waivers judged on", found.judged_on)] if found.judged_on else []),
     ]

@@ -46,7 +46,7 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
             why = found.infeasibility
             if mission.name != ALL and why is not None:
                 why = _of_one(work, mission, why, settings, build)
-            made = framed(found.verdict, work.case, problem, settings.seed)
+            made = framed(found.verdict, work.case, problem, settings)
             return replace(
                 found, spec=made.spec, horizon=made.horizon, provenance=made.provenance,
                 infeasibility=why,
@@ -66,7 +66,7 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
         for i, (one, row) in enumerate(zip(first.spec.requirements, unmet_rows, strict=True))
     )
     return replace(
-        framed("infeasible", work.case, work.scenarios[0].problem, settings.seed),
+        framed("infeasible", work.case, work.scenarios[0].problem, settings),
         requirements=rows,
         warnings=(
             *((LATE,) if why.cut_short else ()),

@@ -300,7 +300,7 @@ def _assembled(
     assert design is not None
     several = bool(work.case.missions)
     rows = family_rows(judged) if several else shown.rows
-    made = framed(word, work.case, work.scenarios[0].problem, settings.seed)
+    made = framed(word, work.case, work.scenarios[0].problem, settings)
     return replace(
         shown.verdict,
         verdict=word,

@@ -37,7 +37,7 @@ def unfinished_verdict(
 ) -> Verdict:
     """A verdict that the time limit left without a design."""
     return replace(
-        framed("indeterminate", case, problem, settings.seed),
+        framed("indeterminate", case, problem, settings),
         requirements=tuple(
             placed(case, index, one, unmet(case, one, in_conflict=False), settings)
             for index, one in enumerate(case.spec.requirements)
@@ -67,7 +67,7 @@ def infeasible_verdict(
         for i, one in enumerate(case.spec.requirements)
     )
     return replace(
-        framed("infeasible", case, problem, settings.seed),
+        framed("infeasible", case, problem, settings),
         requirements=rows,
         warnings=(
             *((LATE,) if found.cut_short else ()),

@@ -96,7 +96,7 @@ def _decided(
 ) -> Verdict:
     """What decides a verdict, and the design that it is about."""
     return replace(
-        framed(verified.word, case, problem, settings.seed),
+        framed(verified.word, case, problem, settings),
         requirements=verified.requirements,
         design=named_design(case, problem, verified.design, verified.figures),
         syncline=syncline_figures(verified, case.spec.sync_model),

@@ -196,7 +196,7 @@ class Caution(Record):
 
 @dataclass(frozen=True, slots=True)
 class Provenance(Record):
-    """What the numbers depend on."""
+    """What the numbers depend on; judged_on: the day, of a spec whose waivers end on one."""
 
     version: str
     spec_sha256: str
@@ -205,6 +205,7 @@ class Provenance(Record):
     seed: int
     python: str
     numpy: str
+    judged_on: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.known_effects import describe
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.recheck import Recheck
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.syncline_figures import (
     LedgerRow,
     LeverArmFigures,
@@ -148,14 +149,14 @@ def known_effects(system: System) -> tuple[KnownEffect, ...]:
     )
 
 
-def framed(word: Word, case: Case, problem: Problem | None, seed: int) -> Verdict:
+def framed(word: Word, case: Case, problem: Problem | None, settings: CheckSettings) -> Verdict:
     """A verdict with the fields that every one has; problem: None where time ended first."""
     horizon = case.spec.horizon.horizon()
     return Verdict(
         verdict=word,
         spec=_spec_frame(case, problem),
         horizon=MissionHorizon(horizon.duration_s, horizon.extent_m, horizon.tilt_rad),
-        provenance=_provenance(case, seed),
+        provenance=_provenance(case, settings),
     )
 
 
@@ -195,7 +196,12 @@ def _stage_frame(stage: StageCase) -> StageFrame:
     )
 
 
-def _provenance(case: Case, seed: int) -> Provenance:
+def has_waivers(case: Case) -> bool:
+    """Whether a verdict depends on the day: one that waives something does."""
+    return bool(case.eased) or any(one.waiver is not None for one in case.spec.requirements)
+
+
+def _provenance(case: Case, settings: CheckSettings) -> Provenance:
     import platform
 
     import numpy as np
@@ -205,9 +211,10 @@ def _provenance(case: Case, seed: int) -> Provenance:
         case.spec_sha256,
         case.catalogs_sha256,
         case.files,
-        seed,
+        settings.seed,
         platform.python_version(),
         np.__version__,
+        settings.day.isoformat() if has_waivers(case) else None,
     )
 
 
