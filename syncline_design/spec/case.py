@@ -144,6 +144,11 @@ class Case:
         object.__setattr__(self, "hardware", _hardware(self, stages))
         object.__setattr__(self, "effects", _effects(self.spec))
 
+    @property
+    def has_waivers(self) -> bool:
+        """Whether what is said of it depends on the day: waivers end on one."""
+        return bool(self.eased) or any(one.waiver is not None for one in self.spec.requirements)
+
     def position(self, path: KeyPath) -> TextPosition:
         """Line and column of a key path, or of the nearest thing around it."""
         around = (path[:length] for length in range(len(path), -1, -1))

@@ -248,11 +248,9 @@ def _base(
         problems.extend(bad.problems)
         return None
     paths = _paths(document, study, factors, problems, str(target))
-    requirements = case.spec.requirements
-    simulated = tuple(r.id for r in requirements if r.kind == "monte_carlo")
-    has_waivers = any(r.waiver is not None for r in requirements)
+    simulated = tuple(r.id for r in case.spec.requirements if r.kind == "monte_carlo")
     return Base(
-        target, document, catalogs, paths, simulated, has_waivers, case.spec.name,
+        target, document, catalogs, paths, simulated, case.has_waivers, case.spec.name,
         case.spec.currency,
     )  # fmt: skip
 

@@ -196,11 +196,6 @@ def _stage_frame(stage: StageCase) -> StageFrame:
     )
 
 
-def has_waivers(case: Case) -> bool:
-    """Whether a verdict depends on the day: one that waives something does."""
-    return bool(case.eased) or any(one.waiver is not None for one in case.spec.requirements)
-
-
 def _provenance(case: Case, settings: CheckSettings) -> Provenance:
     import platform
 
@@ -214,7 +209,7 @@ def _provenance(case: Case, settings: CheckSettings) -> Provenance:
         settings.seed,
         platform.python_version(),
         np.__version__,
-        settings.day.isoformat() if has_waivers(case) else None,
+        settings.day.isoformat() if case.has_waivers else None,
     )
 
 
