@@ -57,7 +57,7 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
     across = len(heat.x_values)
     whole = _room(costs) <= ACROSS / across or across > MOST_TEXT
     fine = is_fine(heat)
-    ends = sorted(costs)[:: max(1, len(costs) - 1)]  # the cheapest and the dearest
+    ends = _ends(costs)
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
@@ -283,7 +283,7 @@ def _meeting(
 ) -> None:  # fmt: skip
     """Cases that meet: a shape for each value of what else varies, all of one strength at once."""
     groups: dict[tuple[int, float], list[ScatterPoint]] = {}
-    ends = sorted(costs)[:: max(1, len(costs) - 1)]
+    ends = _ends(costs)
     for point in meeting:
         strength = round(_strength(point.cost, ends, MARK) / STEP) * STEP
         groups.setdefault((point.kind, strength), []).append(point)
@@ -318,6 +318,11 @@ def _scatter_axis(axes: Axes, which: Literal["x", "y"], axis: ScatterAxis) -> No
         (axes.set_xscale if which == "x" else axes.set_yscale)("log")
         low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
         scales.set_ticks(axes, which, scales.log_ticks(low, high), lambda p: numbers.number(p, 6))
+
+
+def _ends(costs: Sequence[float]) -> tuple[float, ...]:
+    """The cheapest and the dearest, found once for all marks; of no cost none."""
+    return (min(costs), max(costs)) if costs else ()
 
 
 def _strength(

@@ -12,6 +12,7 @@ from syncline_design.report import numbers
 from syncline_design.report.verdict_words import (
     kind_text,
     margin_text,
+    of_mission,
     outcome,
     quantity_then,
     since_sentence,
@@ -56,7 +57,7 @@ class Notice:
     @property
     def label(self) -> str:
         """The requirement by its id, after the mission whose it is; empty where it is of none."""
-        return f"{self.mission} {self.id}".strip()
+        return of_mission(self.mission, self.id)
 
 
 def notices(verdict: Checked) -> list[Notice]:

@@ -30,7 +30,13 @@ from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import unticked, visible
-from syncline_design.report.verdict_words import kind_words, pinned_by, status_word, with_waived
+from syncline_design.report.verdict_words import (
+    kind_words,
+    of_mission,
+    pinned_by,
+    status_word,
+    with_waived,
+)
 from syncline_design.report.words import KINDS, OUTCOMES
 from syncline_design.verdict.tree import PREDICATES
 
@@ -266,7 +272,7 @@ def _margins(data: Diff) -> Table | None:
 
 def _margin_row(entry: RequirementChange) -> tuple[Cell | str, ...]:
     return (
-        Cell(f"{entry.mission or ''} {entry.id}".strip()),
+        Cell(of_mission(entry.mission, entry.id)),
         _limited(entry),
         _standing(entry.old, entry.new),
         _standing(entry.new, entry.old),

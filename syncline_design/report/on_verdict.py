@@ -338,7 +338,7 @@ def _grouped(digits: str) -> str:
     """Digits of a whole number of any size, in groups of three; rounded beyond 15 of them."""
     if len(digits) > 15:
         return f"{digits[0]}.{digits[1:3]}e{len(digits) - 1}"
-    return f"{int(digits):,}".replace(",", "\N{NO-BREAK SPACE}")
+    return numbers.count(int(digits))
 
 
 def _effects(verdict: Verdict) -> list[Node]:

@@ -131,11 +131,9 @@ def rule_sentence(result: StudyResult) -> str:
 def stored_text(result: StudyResult) -> str:
     """What was computed and what was there already: it differs from run to run."""
     again = f", {numbers.count(result.retried)} done again after a worker died"
-    computed = (
-        f"{numbers.count(result.computed)} case{'' if result.computed == 1 else 's'} computed"
-    )
     return (
-        f"{computed}, {numbers.count(result.reused)} already there"
+        f"{numbers.counted(result.computed, 'case')} computed, "
+        f"{numbers.count(result.reused)} already there"
         f"{again if result.retried else ''}; kept in {result.store.folder}"
     )
 
@@ -171,7 +169,7 @@ def cell_notes(heat: HeatMap, *, signs: bool = True) -> str:
     if "refused" in words:
         told.append(f"\N{EN DASH}: {COMBINED}.")
     if heat.undecided:
-        many = "1 cell" if heat.undecided == 1 else f"{numbers.count(heat.undecided)} cells"
+        many = numbers.counted(heat.undecided, "cell")
         told.append(f"In {many} a case got no verdict: what costs less may meet.")
     return " ".join(told)
 

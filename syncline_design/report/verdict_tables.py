@@ -13,6 +13,7 @@ from syncline_design.report.verdict_words import (
     kind_text,
     larger,
     margin_text,
+    of_mission,
     relative_margin,
     row_now,
     selection_reason,
@@ -71,7 +72,7 @@ def since(verdict: Verdict) -> Table | None:
         then = None if was is None else status_word(was.status, waived=bool(was.waived))
         since = since_word(one, verdict)
         rows.append((
-            Cell(f"{one.mission or ''} {one.id}".strip()),
+            Cell(of_mission(one.mission, one.id)),
             Cell(since.word, tone=since.tone),
             "-" if word is None else word.word,
             _both(row),

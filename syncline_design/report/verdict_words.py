@@ -156,6 +156,11 @@ def since_word(one: RequirementSince, verdict: Verdict) -> Outcome:
     return since
 
 
+def of_mission(mission: str | None, requirement: str) -> str:
+    """`high ACC-1`: a requirement by its id, after the mission whose it is, if it is one's."""
+    return f"{mission} {requirement}" if mission else requirement
+
+
 def row_now(one: RequirementSince, verdict: Verdict) -> RequirementResult | None:
     """A requirement as it stands now: of its mission, or of all together; None where it is gone."""
     rows = verdict.requirements
@@ -204,7 +209,7 @@ def worse_but_waived(verdict: Verdict) -> list[str]:
     """Ids of what got worse since the baseline and does not count, by a waiver in force."""
     since = verdict.baseline.requirements if verdict.baseline else ()
     worse = {(one.mission, one.id) for one in since if one.change == "worse"}
-    found = [f"{mission or ''} {row.id}".strip() for mission, row in verdict.judged_rows
+    found = [of_mission(mission, row.id) for mission, row in verdict.judged_rows
              if row.status == "fail" and row.is_waived and (mission, row.id) in worse]  # fmt: skip
     return list(map(visible, found))
 
