@@ -123,6 +123,33 @@ def test_every_output_names_the_mission_and_the_requirement_apart(tmp_path: Path
     assert "high ACC-1" in console(on_verdict(now))
 
 
+@pytest.mark.parametrize(
+    ("limit", "code", "change"), [("0.004 m", 1, "worse"), ("0.005 m", 0, "same")]
+)
+def test_a_family_without_a_design_is_held_by_what_it_cannot_meet(
+    tmp_path: Path, limit: str, code: int, change: str
+) -> None:
+    """No design judges a mission; which limit stands in the way is said of all together."""
+    own = "attitude: {sensor: sbg_apogee, primitive: pps, timestamping: gpio}"
+    offered = own.replace(
+        "sensor: sbg_apogee, primitive: pps", "candidates: [sbg_apogee, sbg_ellipse]"
+    )
+    found = []
+    for text in ("0.005 m", limit):
+        spec = SPEC.replace(own, offered).replace("limit: 0.10 m", f"limit: {text}")
+        path = tmp_path / "own.yaml"
+        path.write_text(f"{spec}  - {{name: near}}\n  - {{name: as given}}\n", encoding="utf-8")
+        found.append(check_file(path, CheckSettings(monte_carlo=False)))
+    then, now = found
+    assert (then.verdict, now.verdict) == ("infeasible", "infeasible")
+    held = against(now, [then], "old.json")
+    assert held.exit_code == code
+    assert held.baseline is not None
+    of_all = held.baseline.of("ACC-1")
+    assert of_all is not None
+    assert of_all.change == change
+
+
 def test_a_diff_tells_what_became_of_each_mission(tmp_path: Path) -> None:
     found = changes(verdict_of(tmp_path, LOW, HIGH), verdict_of(tmp_path, LOW, WORSE, EXTRA))
     told = {(one.mission, one.id): one for one in found.missions or ()}

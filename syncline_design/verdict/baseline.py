@@ -39,16 +39,24 @@ def against(verdict: Verdict, earlier: Sequence[Verdict], file: str) -> Verdict:
         return replace(verdict, baseline=found)
     rows = tuple(_with_missions(verdict, before))
     found = Baseline(file, before.verdict, _fell(verdict, before), rows)
-    missed = [(mission, row) for mission, row in verdict.judged_rows if _standing(row) > 0]
-    worse = found.worse or any(not found.forgives(row.id, mission) for mission, row in missed)
+    worse = found.worse or any(not found.forgives(row.id, name) for name, row in _missed(verdict))
     return replace(verdict, baseline=replace(found, worse=worse))
+
+
+def _missed(verdict: Verdict) -> list[tuple[str | None, RequirementResult]]:
+    """What does not pass, with its mission; without a design, what all missions cannot meet too."""
+    rows = list(verdict.judged_rows)
+    if verdict.design is None and verdict.missions is not None:
+        rows += [(None, row) for row in verdict.requirements]
+    return [(name, row) for name, row in rows if _standing(row) > 0]
 
 
 def _with_missions(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
     """What became of every requirement; of missions, each mission's after what is said of all.
 
     A row of all missions is that of the one nearest its limit, which may be another than before:
-    so it got worse where any mission's did.
+    so it got worse where any mission's did.  Without a design no mission is judged, and what
+    stands in the way is said of all.
     """
     then = {mission.name: mission for mission in before.missions or ()}
     own = [
@@ -61,9 +69,10 @@ def _with_missions(verdict: Verdict, before: Verdict) -> Iterator[RequirementSin
         for name, mission in then.items() if verdict.missions
         for row in mission.requirements if not _is_implied(row)
     ]  # fmt: skip
-    missed = {(name, row.id) for name, row in verdict.judged_rows if _standing(row) > 0}
+    judged = own if verdict.design is not None else []
+    missed = {(name, row.id) for name, row in _missed(verdict)}
     for row in _rows(verdict, before):
-        each = [one for one in own if one.id == row.id and one.change != "gone"]
+        each = [one for one in judged if one.id == row.id and one.change != "gone"]
         yield replace(row, change=_of_all(row.change, each, missed)) if each else row
     yield from own
 
