@@ -169,7 +169,7 @@ def cell_notes(heat: HeatMap, *, signs: bool = True) -> str:
     if "refused" in words:
         told.append(f"\N{EN DASH}: {COMBINED}.")
     if heat.undecided:
-        many = numbers.counted(heat.undecided, "cell")
+        many = "1 cell" if heat.undecided == 1 else f"{numbers.count(heat.undecided)} cells"
         told.append(f"In {many} a case got no verdict: what costs less may meet.")
     return " ".join(told)
 
