@@ -205,7 +205,7 @@
   document.querySelectorAll(".drawing[data-points]").forEach(tips);
 
   // To take away: figures as SVG and PNG, tables as CSV, made here from what the page holds.
-  // Files are called after what the page is about and the name that `--output svg:FOLDER` gives a figure.
+  // Files are called after what the page is about and the name that --output svg:FOLDER gives a figure.
   function fileName(text) {
     var words = text.toLowerCase().match(/[\p{L}\p{M}\p{N}]+/gu) || [], name = "";
     words.every(function (word) {
