@@ -377,6 +377,8 @@ def test_a_verdict_that_depends_on_the_day_says_which(tmp_path: Path) -> None:
         assert isinstance(found, Verdict)
         assert found.provenance.judged_on == day.isoformat()
         assert f"waivers judged on {day.isoformat()}" in console(on_verdict(found))
+    chosen = sd.optimize(path)
+    assert chosen.provenance.judged_on == date.today().isoformat()
     plain = verdict_of(tmp_path, FAILING)
     assert plain.provenance.judged_on is None
     assert "judged_on" not in plain.provenance.to_json()

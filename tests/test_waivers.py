@@ -32,9 +32,11 @@ from syncline_design.report.on_diff import on_diff
 from syncline_design.report.on_study import on_study
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
+from syncline_design.report.render_html import html
 from syncline_design.report.study_notices import study_notices
 from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.studies import StudySettings, run_study
+from syncline_design.studies.data import study_data
 from syncline_design.verdict.baseline import against
 from syncline_design.verdict.optimize import OptimizeSettings, optimize
 from syncline_design.verdict.pinned import picked_design
@@ -373,6 +375,8 @@ def test_a_study_tells_every_waiver_of_what_its_bases_miss(tmp_path: Path) -> No
     assert "waived until 2027-03-31: paper trial; waiver expired on 2026-11-29: late" in shown
     told = "".join(one.message for one in study_notices(result))
     assert "waiver expired on 2026-11-29: late" in told
+    assert study_data(result).provenance.judged_on == DAY.isoformat()
+    assert DAY.isoformat() in html(on_study(result))
 
 
 def test_a_diff_names_what_is_waived(waived: tuple[Path, str]) -> None:

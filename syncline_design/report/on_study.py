@@ -43,7 +43,7 @@ from syncline_design.report.study_words import (
 from syncline_design.report.svg import InlineChart
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import with_waived
+from syncline_design.report.verdict_words import JUDGED_ON, with_waived
 from syncline_design.report.words import OUTCOMES
 from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
@@ -319,7 +319,7 @@ def _case_table(summary: StudySummary) -> Table:
             Cell(why),
         ])  # fmt: skip
     few = len(several) <= MOST_KEYS
-    keys = [short_key(factor.key) for _, factor in several] if few else ["Setting"]
+    keys = [_head(factor) for _, factor in several] if few else ["Setting"]
     varying = [*(["Base"] if many else []), *keys]
     ends = ["Verdict", "Price #", "Syncline error #", "Payload, or why there is none"]
     heads = ["Case #", *varying, *ends]
@@ -359,6 +359,11 @@ def _failing(brief: Brief) -> str:
     return ", ".join(visible(one) for one in brief.failing if one not in brief.waived)
 
 
+def _head(factor: Factor) -> str:
+    """A key above its values: figures are set flush right."""
+    return f"{short_key(factor.key)}{' #' if factor.is_of_figures else ''}"
+
+
 def _setting_cells(brief: Brief, several: list[tuple[int, Factor]]) -> list[Cell]:
     """What varies: a cell per key, or one cell that names them all."""
     if len(several) <= MOST_KEYS:
@@ -376,4 +381,6 @@ def _provenance(result: StudyResult) -> list[tuple[str, str]]:
     for base in result.study.bases:
         facts.append((f"SHA-256 of {base.path}", base.document.sha256))
         facts.append((f"SHA-256 of the catalogs of {base.path}", base.catalogs.sha256()))
+    if result.judged_on:
+        facts.append((JUDGED_ON, result.judged_on))
     return facts

@@ -24,6 +24,7 @@ from syncline_design.report.words import (
 from syncline_design.verdict.obstacle import obstacle_sentence
 from syncline_design.verdict.tree import waived_misses
 
+JUDGED_ON: Final = "Waivers judged on"
 LOOKED_OVER: Final = 8  # requirements that a reader takes in at a glance
 MANY_TIMES: Final = 11.0  # a limit that is missed by more is told so, not by per cent
 NAMED: Final = 6  # of those that fail, by name
@@ -314,5 +315,5 @@ def pinned_by(found: Provenance) -> list[tuple[str, str]]:
         *pins(found.version, found.spec_sha256, found.catalogs_sha256, found.seed),
         ("Python", found.python),
         ("NumPy", found.numpy),
-        *([("Waivers judged on", found.judged_on)] if found.judged_on else []),
+        *([(JUDGED_ON, found.judged_on)] if found.judged_on else []),
     ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field, replace
+from datetime import date
 from fractions import Fraction
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -148,6 +149,10 @@ class Case:
     def has_waivers(self) -> bool:
         """Whether what is said of it depends on the day: waivers end on one."""
         return bool(self.eased) or any(one.waiver is not None for one in self.spec.requirements)
+
+    def judged_on(self, day: date) -> str | None:
+        """The day as a provenance names it, of a spec whose waivers end on one."""
+        return day.isoformat() if self.has_waivers else None
 
     def position(self, path: KeyPath) -> TextPosition:
         """Line and column of a key path, or of the nearest thing around it."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from syncline_design import __version__
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Record, SchemaName
+from syncline_design.machine.records import Record, SchemaName, optional
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import MeetsWhen
 from syncline_design.studies.finished import Finished
@@ -49,12 +49,13 @@ class BaseHashes(Record):
 
 @dataclass(frozen=True, slots=True)
 class StudyProvenance(Record):
-    """What the numbers depend on."""
+    """What the numbers depend on; judged_on: the day, of bases whose waivers end on one."""
 
     version: str
     seed: int
     study_sha256: str
     bases: tuple[BaseHashes, ...]
+    judged_on: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,4 +100,4 @@ def _provenance(result: Finished) -> StudyProvenance:
         BaseHashes(str(base.path), base.document.sha256, base.catalogs.sha256())
         for base in result.study.bases
     )
-    return StudyProvenance(__version__, result.seed, result.study.sha256, bases)
+    return StudyProvenance(__version__, result.seed, result.study.sha256, bases, result.judged_on)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import field
+from datetime import date
 from functools import cached_property
 from typing import Any, get_args
 
@@ -59,6 +60,7 @@ class Finished:
 
     study: Study
     seed: int
+    today: date
     keys: tuple[str, ...] = field(repr=False)
     store: Store = field(repr=False)
     unsettled: dict[str, CaseRecord] = field(repr=False)  # by key: no verdict this time
@@ -66,6 +68,11 @@ class Finished:
     computed: int
     retried: int
     elapsed_s: float
+
+    @property
+    def judged_on(self) -> str | None:
+        """The day on which waivers were judged; None where no base has one."""
+        return self.today.isoformat() if any(b.has_waivers for b in self.study.bases) else None
 
     def __len__(self) -> int:
         return len(self.keys)

@@ -113,8 +113,8 @@ class _Run:
         firsts = {twin: index for index, group in twins.items() for twin in group}
         placed = tuple(keys[firsts[index]] for index in range(len(cases)))
         return StudyResult(
-            self.study, self.settings.seed, placed, self.store, self.unsettled, reused,
-            len(missing), self.retried, elapsed,
+            self.study, self.settings.seed, self.shared.today, placed, self.store, self.unsettled,
+            reused, len(missing), self.retried, elapsed,
         )  # fmt: skip
 
     def _twins(self, cases: Sequence[str]) -> dict[int, list[int]]:

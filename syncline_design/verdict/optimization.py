@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Annotated
 
+from syncline_design import __version__
 from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import (
     Explanation,
@@ -35,6 +36,7 @@ from syncline_design.verdict.named import (
     Nearest,
     RankedDesign,
 )
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
 from syncline_design.verdict.why_not import Answer
 
@@ -63,13 +65,22 @@ class OptimizeSettings:
 
 @dataclass(frozen=True, slots=True)
 class MadeFrom(Record):
-    """What the choice depends on."""
+    """What the choice depends on; judged_on: the day, of a spec whose waivers end on one."""
 
     version: str
     spec_sha256: str
     catalogs_sha256: str
     files: tuple[FileRead, ...]
     seed: int
+    judged_on: str | None = optional()
+
+
+def made_from(case: Case, settings: CheckSettings) -> MadeFrom:
+    """Of a spec and how it was checked."""
+    return MadeFrom(
+        __version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed,
+        case.judged_on(settings.day),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from syncline_design import __version__
 from syncline_design.choice.decide import best
 from syncline_design.choice.explain import explain
 from syncline_design.choice.front import front, staircase
@@ -53,10 +52,10 @@ from syncline_design.verdict.open_choice import Picked, chosen_of, pick
 from syncline_design.verdict.optimization import (
     NO_TABLES,
     Hinged,
-    MadeFrom,
     Optimization,
     Optimized,
     OptimizeSettings,
+    made_from,
 )
 from syncline_design.verdict.optimize_family import optimize_family
 from syncline_design.verdict.scenarios import is_family
@@ -108,7 +107,7 @@ def _told(
     designs: tuple[Design, ...] = ()
     word = _word(case, problem, picked)
     kind = Hinged if word == "meets" and picked.exhausted else Optimization
-    result = _begun(kind, case, problem, settings, picked.choice.proof)
+    result = _begun(kind, case, problem, checking, picked.choice.proof)
     if picked.verified is None:
         result = _with_reasons(result, case, problem, build, pieces)
     elif picked.exhausted:
@@ -171,7 +170,7 @@ def _unfinished(
     known = None if problem is NO_TABLES else problem
     verdict = unfinished_verdict(case, known, checking, why) if settings.report else None
     result = replace(
-        _begun(Optimization, case, problem, settings, Proof(settings.road, False, False)),
+        _begun(Optimization, case, problem, checking, Proof(settings.road, False, False)),
         cut_short=("choosing",),
         message=f"No verdict: {why}; no design was found by then.",
     )
@@ -194,7 +193,7 @@ def _begun(
     kind: type[Optimization],
     case: Case,
     problem: Problem,
-    settings: OptimizeSettings,
+    checking: CheckSettings,
     proof: Proof,
 ) -> Optimization:
     """A result with the parts that every one has, nothing decided yet."""
@@ -206,9 +205,7 @@ def _begun(
         combinations=None if problem is NO_TABLES else str(problem.combinations),
         excluded=excluded,
         excluded_count=count,
-        provenance=MadeFrom(
-            __version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed
-        ),
+        provenance=made_from(case, checking),
     )
 
 

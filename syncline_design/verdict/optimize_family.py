@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from syncline_design import __version__
 from syncline_design.choice.front import staircase
 from syncline_design.choice.outcome import PriceStep, Proof
 from syncline_design.choice.problem import selection_of
@@ -41,10 +40,10 @@ from syncline_design.verdict.named import FrontDesign, RankedDesign
 from syncline_design.verdict.optimization import (
     NO_TABLES,
     Hinges,
-    MadeFrom,
     Optimization,
     Optimized,
     OptimizeSettings,
+    made_from,
     with_hinges,
 )
 from syncline_design.verdict.pinned import pinned_role
@@ -69,7 +68,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimized:
     judged = judged_family(case, checking)
     verdict, work = judged.verdict, judged.work
     if work is None:
-        return _unfinished(case, settings, verdict)
+        return _unfinished(case, settings, checking, verdict)
     designs: list[RankedDesign] = []
     front: Front | None = None
     pieces = Pieces()
@@ -98,7 +97,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimized:
         excluded=excluded,
         excluded_count=count,
         cut_short=tuple(pieces.cut_short),
-        provenance=_provenance(case, settings),
+        provenance=made_from(case, checking),
         infeasibility=None if has_design else verdict.infeasibility,
         nearest=None if has_design else verdict.nearest,
         alternatives=choice.alternatives if has_design and choice is not None else None,
@@ -171,11 +170,9 @@ def _told(verdict: Verdict, settings: OptimizeSettings) -> Iterator[Caution]:
             yield one
 
 
-def _provenance(case: Case, settings: OptimizeSettings) -> MadeFrom:
-    return MadeFrom(__version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed)
-
-
-def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Optimized:
+def _unfinished(
+    case: Case, settings: OptimizeSettings, checking: CheckSettings, verdict: Verdict
+) -> Optimized:
     """What there is to say when the time limit came before any table."""
     result = Optimization(
         verdict="indeterminate",
@@ -185,7 +182,7 @@ def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Opt
         excluded=(),
         excluded_count=0,
         cut_short=("choosing",),
-        provenance=_provenance(case, settings),
+        provenance=made_from(case, checking),
         message=f"No verdict: {verdict.warnings[0].message}.",
     )
     shown = verdict if settings.report else None

@@ -209,7 +209,7 @@ def _provenance(case: Case, settings: CheckSettings) -> Provenance:
         settings.seed,
         platform.python_version(),
         np.__version__,
-        settings.day.isoformat() if case.has_waivers else None,
+        case.judged_on(settings.day),
     )
 
 
