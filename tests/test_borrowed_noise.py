@@ -91,10 +91,10 @@ def test_doubt_is_two_deviations_of_the_cross_term() -> None:
     nats = 0.5 * float(added @ added)
     cross = rng.standard_normal((4000, 400)) @ added
     assert doubt_nats(nats, 0.0) == pytest.approx(2.0 * float(np.std(cross)), rel=0.05)
-    charged = Charge(1, 4.0, nats, unusual=True)
+    charged = Charge(1, 4.0, nats, UNUSUAL_NATS)
     assert charged.nats == 4.0 - nats
     assert charged.prior == UNUSUAL_NATS
-    assert charged.doubt(Charge(1, 1.0, 0.0, unusual=False)) == doubt_nats(nats, 0.0)
+    assert charged.doubt(Charge(1, 1.0, 0.0, 0.0)) == doubt_nats(nats, 0.0)
 
 
 def test_an_axis_that_never_varies_says_nothing_of_the_others_noise(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from syncline_design.diagnosis.candidates import AS_GOOD_NATS, commonness
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.result import Scope
 from syncline_design.diagnosis.scores import log_p_of
+from syncline_design.diagnosis.unusual import unusual_nats
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import chi_square_beyond
@@ -150,7 +151,7 @@ class Naming:
             gain = trial.gain - model.gain
             log_p = log_p_of(2.0 * gain, freedom(trial, -1)) + self.charge(one.scope)
             if gain > LEAST_GAIN and log_p < math.log(self.rate) and plausible(trial):
-                trials.append((log_p, one, trial))
+                trials.append((log_p + unusual_of(trial, -1), one, trial))
         kept = [t for t in trials if self.stands(t[2], len(model.scoped))]
         if not kept:
             return None
@@ -244,6 +245,7 @@ class Naming:
                 continue
             trial = self._replaced(model, k, term)
             worse = model.gain - own - (trial.gain - freedom(trial, k))
+            worse += unusual_of(trial, k) - unusual_of(model, k)
             found.append(WorseFit(term, worse, self._cosine(model, k, term), plausible(trial)))
         return sorted(found, key=lambda b: b.worse)
 
@@ -305,6 +307,13 @@ def freedom(model: Fitted, k: int) -> int:
     """How many values of an effect are seen."""
     size = np.diag(model.normal)[model.place[k]]
     return max(int(np.sum(size > 0.0)), 1)
+
+
+def unusual_of(model: Fitted, k: int) -> float:
+    """What is charged where a value of an effect is hardly ever met [nat]."""
+    place = model.place[k]
+    spreads = np.sqrt(np.maximum(np.diag(model.inverse)[place], 0.0))
+    return unusual_nats(model.scoped[k].term.effect, model.values[place], spreads)
 
 
 def ratio(judged: Judged) -> float:

@@ -15,7 +15,7 @@ from syncline_design.campaign.sight import limits_of
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.campaign.unlike import RATE, UnlikeLog
 from syncline_design.diagnosis.consequence import Weights, promise_of
-from syncline_design.diagnosis.finding import estimate, evidence_words, finding, in_words
+from syncline_design.diagnosis.finding import estimate, evidence_words, finding, in_words, odds
 from syncline_design.diagnosis.gap_result import Remaining, WholeGap
 from syncline_design.diagnosis.judged import Judged
 from syncline_design.diagnosis.plotted import (
@@ -52,7 +52,6 @@ from syncline_design.model.figure_text import format_estimates
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.case import Case
 
-MOST_NATS = 300.0
 MOST_TOLD = 3  # logs whose own values a sentence tells
 
 
@@ -155,8 +154,8 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
     )
     words = evidence_words(one.gain, one.log_p / math.log(10.0), noise_kept=True)
     aliases = tuple(_rival(told, b) for b in one.rivals)
-    total = 1.0 + sum(_odds(b.nats_worse) for b in aliases)
-    aliases = tuple(replace(b, probability=_odds(b.nats_worse) / total) for b in aliases)
+    total = 1.0 + sum(odds(b.nats_worse) for b in aliases)
+    aliases = tuple(replace(b, probability=odds(b.nats_worse) / total) for b in aliases)
     found = finding(
         effect, term.sensor, stage, shown, words, one.gain, one.log_p / math.log(10.0),
         (aliases, (), ()), material, size_m,
@@ -194,10 +193,6 @@ def _differing_words(effect: Effect, sensor: str, logs: Sequence[PerLog], scope:
     words = "; ".join(f"{one.file}: {in_words(effect, sensor, one.parameters)}" for one in said)
     ends = f" (the ends of {len(logs)})" if len(said) < len(logs) else ""
     return f"The logs disagree, another value {every}: {words}{ends}"
-
-
-def _odds(worse: float) -> float:
-    return math.exp(-min(max(worse, -MOST_NATS), MOST_NATS))
 
 
 def _rival(told: Told, one: WorseFit) -> Rival:

@@ -18,29 +18,28 @@ from dataclasses import replace
 import numpy as np
 
 from syncline_design.diagnosis.borrowed import doubt_nats
-from syncline_design.diagnosis.candidates import slopes
+from syncline_design.diagnosis.candidates import AS_GOOD_NATS, slopes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.identity import Label, effect_of
 from syncline_design.diagnosis.trials import freedom_of
+from syncline_design.diagnosis.unusual import UNUSUAL_NATS, unusual_nats
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
 USUAL_ARM = 3.0  # longest arm or baseline of a stage, beyond which an error of an arm is not usual
-
-UNUSUAL_NATS = 5.0  # what such an arm is charged: one in a hundred or so
 
 
 @dataclass(frozen=True, slots=True)
 class Charge:
     """count: of its figures; figures: what they cost [nat]; borrowed: noise of columns [nat].
 
-    unusual: whether its values are beyond what such an effect usually has on this platform.
+    prior: what values are charged that are beyond what such an effect usually has [nat].
     """
 
     count: int
     figures: float
     borrowed: float
-    unusual: bool
+    prior: float
 
     @property
     def nats(self) -> float:
@@ -48,9 +47,9 @@ class Charge:
         return self.figures - self.borrowed
 
     @property
-    def prior(self) -> float:
-        """What unusual values are charged."""
-        return UNUSUAL_NATS if self.unusual else 0.0
+    def unusual(self) -> bool:
+        """Whether its values are hardly what such an effect has."""
+        return self.prior > AS_GOOD_NATS
 
     def doubt(self, other: Charge) -> float:
         """By how much the noise of columns may have chosen between two effects [nat]."""
@@ -61,7 +60,7 @@ def charge(data: Data, model: Model, label: Label, named: Model) -> Charge:
     """What one effect of a model is charged, at the covariance of the named one's."""
     borrowed = data.borrowed_nats(model, named.precision)
     count = freedom_of(effect_of(model, label))
-    return Charge(count, _figures(data, model, label), borrowed, _unusual(data, model, label))
+    return Charge(count, _figures(data, model, label), borrowed, _prior(data, model, label))
 
 
 def _figures(data: Data, model: Model, label: Label) -> float:
@@ -138,7 +137,15 @@ def _square(values: Array, covariance: Array) -> float:
     return float(unit @ np.linalg.pinv(correlation, rcond=1e-10, hermitian=True) @ unit)
 
 
-def _unusual(data: Data, model: Model, label: Label) -> bool:
+def _prior(data: Data, model: Model, label: Label) -> float:
+    values, covariance = _fitted(model, label)
+    if _is_unusual_arm(data, model, label):
+        return UNUSUAL_NATS
+    spreads = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return unusual_nats(effect_of(model, label), values, spreads)
+
+
+def _is_unusual_arm(data: Data, model: Model, label: Label) -> bool:
     """An arm that is off by more than some of the longest arm or baseline that the spec knows."""
     if effect_of(model, label).breaks != "lever_arm":
         return False

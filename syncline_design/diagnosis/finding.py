@@ -124,12 +124,12 @@ def is_noise(effect: Effect) -> bool:
 
 
 def _probability(aliases: Sequence[Rival]) -> float:
-    return 1.0 / (1.0 + sum(_odds(one) for one in aliases))
+    return 1.0 / (1.0 + sum(odds(one.nats_worse) for one in aliases))
 
 
-def _odds(alias: Rival) -> float:
-    """Posterior odds of an alias against the named effect, by what each fits and pays."""
-    return math.exp(-min(max(alias.nats_worse, -MOST_NATS), MOST_NATS))
+def odds(worse: float) -> float:
+    """Posterior odds against the named effect, of one that fits and pays so much worse [nat]."""
+    return math.exp(-min(max(worse, -MOST_NATS), MOST_NATS))
 
 
 def named_finding(
@@ -150,8 +150,8 @@ def named_finding(
     wider = _wider(final, label)
     aliases, lookalikes, excluded = (tuple(_rival(view, a, wider) for a in own) for own in lists)
     where = view.system.stages[label[2]].name
-    total = 1.0 + sum(_odds(one) for one in aliases)
-    aliases = tuple(replace(one, probability=_odds(one) / total) for one in aliases)
+    total = 1.0 + sum(odds(one.nats_worse) for one in aliases)
+    aliases = tuple(replace(one, probability=odds(one.nats_worse) / total) for one in aliases)
     rivals = (aliases, lookalikes, excluded)
     values = tuple((name, e.value) for name, e in found.items())
     material = weights.material(size_m, EffectEntry(effect.name, label[1], where, values))

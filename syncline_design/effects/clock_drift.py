@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from syncline_design.effects.kinematics import elapsed, shift_slope, shifted
 from syncline_design.effects.record import (
     ActsOn,
@@ -16,6 +18,8 @@ from syncline_design.effects.record import (
     Values,
 )
 from syncline_design.model.system import Stage
+
+CRYSTAL: Final = 1e-4  # of crystals 20 ppm (Micro Crystal RV-3028-C7), of a lidar 58 ppm (HDL-64E)
 
 
 def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
@@ -37,7 +41,7 @@ EFFECT = Effect(
     name="clock_drift",
     sensors=("position", "attitude", "ranging"),
     kind="deterministic",
-    parameters=(Parameter("rate", 1e-7, 1e-2),),
+    parameters=(Parameter("rate", 1e-7, 1e-2, usual=CRYSTAL),),
     sentence="the clock that stamps the {sensor} data runs fast by {rate}",
     confused_with="timestamp_step; heading_drift (attitude)",
     separated_by="repeating the same manoeuvre early and late",

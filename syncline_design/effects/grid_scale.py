@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from syncline_design.effects.record import (
@@ -17,6 +19,8 @@ from syncline_design.effects.record import (
     Values,
 )
 from syncline_design.model.system import Stage
+
+PROJECTED: Final = 1e-3  # of UTM 0.9996 to 1.00098 (Snyder, USGS Professional Paper 1395, 1987)
 
 
 def _depart(rows: StageRows, values: Values, sensor: ActsOn, _: Rng) -> Departures:
@@ -44,7 +48,7 @@ EFFECT = Effect(
     name="grid_scale",
     sensors=("target",),
     kind="deterministic",
-    parameters=(Parameter("scale", 1e-7, 0.01, above=-1.0),),
+    parameters=(Parameter("scale", 1e-7, 0.01, above=-1.0, usual=PROJECTED),),
     sentence="the survey's grid is too large by a share of {scale}",
     confused_with="datum_offset on a short baseline",
     separated_by="a long baseline",

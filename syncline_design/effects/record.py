@@ -123,6 +123,7 @@ NOTHING = Departures()
 class Parameter:
     """One parameter: its name carries the unit; [low, high] is its plausible magnitude.
 
+    usual: the magnitude beyond which it is hardly ever met, where there is a source for one.
     choices: what a discrete parameter may be, by the sensor it acts on; its value is then a text.
     located: the error depends on it only through where along the log something happens.
     above, most: the values between which the effect exists at all, `above` left out (a factor of
@@ -140,6 +141,7 @@ class Parameter:
     above: float = -math.inf
     most: float = math.inf
     whole: bool = False
+    usual: float = math.inf
 
     def holds(self, value: float) -> bool:
         """Whether the effect exists with this value."""
