@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from diagnosis_samples import DESIGN, LATENCY, diagnosis
 from syncline_design.campaign.adding import _named as named_alone
@@ -23,6 +24,8 @@ from syncline_design.report.on_joint import unlike_words
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
+from syncline_design.spec.edit import with_effects_text
+from syncline_design.spec.load import load, load_text
 from watched_series import BOUND, car_spec, kept, run_of, statistics, watch
 
 ARM = Rival("lever_arm", "position", "car", 0.999, 0.4, probability=0.3)
@@ -74,6 +77,18 @@ def test_three_members_are_named_and_the_others_counted() -> None:
     told = [any_of(every[:n]) for n in range(6)]
     assert told == ["", "a", "a or b", "a, b or c", "a, b, c or another one",
                     "a, b, c or one of 2 others"]  # fmt: skip
+
+
+def test_a_spec_that_lists_one_of_a_class_says_so(tmp_path: Path) -> None:
+    """In the text of the spec, which reads back; what is told has no note."""
+    case = load(car_spec(tmp_path / "car.yaml"))
+    texts = [with_effects_text(case, one.as_entries()) for one in (BOTH, TOLD)]
+    note = (
+        "one of 2 effects that the data cannot tell apart: latency (position) or lever arm "
+        "(position)"
+    )
+    assert [yaml.safe_load(text)["effects"][0].get("note", "") for text in texts] == [note, ""]
+    assert load_text(texts[0], tmp_path / "found.yaml").spec.effects[0].note == note
 
 
 @pytest.mark.parametrize("one", [TOLD, replace(LATENCY, aliases=())])

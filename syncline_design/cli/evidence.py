@@ -237,7 +237,9 @@ def _write_findings(case: Case, found: Diagnosis, means: DesignMeaning | None, p
         from syncline_design.spec.edit import with_effects_text, write_spec
 
         write_spec(with_effects_text(case, entries), path)
-        say(f"spec with the findings written to {path}")
+        first = "; of what cannot be told apart, the first (see note:)"
+        several = any(entry.note for entry in entries)
+        say(f"spec with the findings written to {path}{first if several else ''}")
         return
     if entries:
         why = "the time was over"

@@ -10,6 +10,7 @@ from typing import Annotated, Final, Literal
 from typing_extensions import TypeAliasType
 
 from syncline_design.diagnosis.gap_result import Gap, Regime, Remaining, WholeGap
+from syncline_design.diagnosis.one_of_several import note_of
 from syncline_design.diagnosis.plotted import Plots
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
@@ -219,6 +220,7 @@ class Finding(Record):
                 n: s for n, s in spreads.items() if s is not None and math.isfinite(s)
             },
             source="diagnose",
+            note=note_of(self),
         )
 
 
