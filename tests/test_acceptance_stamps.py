@@ -30,14 +30,22 @@ def accepted(folder: Path, log: Path, horizon: str = "1 h") -> tuple[dict[str, A
 
 
 def messages(
-    folder: Path, late: Errors, transport: Errors, length_s: float = 600.0, drift_ppm: float = 0.0
+    folder: Path,
+    late: Errors,
+    transport: Errors,
+    length_s: float = 600.0,
+    drift_ppm: float = 0.0,
+    set_at: float = 0.5,
 ) -> Path:
-    """Messages of 10 Hz whose stamps are late by an error, received some transport after them."""
+    """Messages of 10 Hz whose stamps are late by an error, received some transport after them.
+
+    set_at: where in the log a clock that drifts is right.
+    """
     source = np.random.default_rng(17)
     true_s = 0.1 * np.arange(round(10 * length_s))
     stamp_s = true_s + late(true_s, source)
     receive_s = stamp_s + transport(true_s, source)
-    stamp_s = stamp_s + 1e-6 * drift_ppm * (true_s - 0.5 * length_s)
+    stamp_s = stamp_s + 1e-6 * drift_ppm * (true_s - set_at * length_s)
     rows = sorted(zip(receive_s, stamp_s, strict=True))
     path = folder / "uav_position.csv"
     lines = [f"{START_S + s:.7f},{START_S + r:.7f}" for r, s in rows]
@@ -133,3 +141,37 @@ def test_a_log_is_held_against_the_horizon(
     if status == "not_shown":
         drifting = messages(tmp_path, none, waits, length_s, 1.0)  # 3.6 ms in an hour
         assert accepted(tmp_path, drifting, horizon)[0]["status"] != "holds"
+
+
+@pytest.mark.parametrize(
+    ("length_s", "horizon", "status", "grown_s"),
+    [
+        (1800.0, "5 min", "holds", 0.9e-3),  # 5.4 ms over the log
+        (1800.0, "20 min", "broken", 3.6e-3),
+        (600.0, "5 min", "holds", 0.9e-3),
+        (600.0, "1 h", "broken", 10.8e-3),  # 1.8 ms over the log
+        (480.0, "8 min", "holds", 1.44e-3),
+    ],
+)
+def test_a_drift_counts_over_the_horizon(
+    tmp_path: Path, length_s: float, horizon: str, status: str, grown_s: float
+) -> None:
+    """3 ppm are 3e-6 times the horizon, whatever the log's length, of 2 ms that are assumed."""
+    for ppm in (3.0, -3.0):
+        log = messages(tmp_path, none, waits, length_s, ppm, set_at=0.0)
+        row, _ = accepted(tmp_path, log, horizon)
+        demand_counted(row, length_s, horizon, (status, grown_s))
+
+
+def demand_counted(
+    row: dict[str, Any], length_s: float, horizon: str, expected: tuple[str, float]
+) -> None:
+    status, grown_s = expected
+    assert row["status"] == status, row
+    if status == "broken":
+        assert row["measured"]["value"] == pytest.approx(grown_s, rel=0.02)
+    else:  # transport of 0.1 to 0.3 ms adds to it, or takes from it where stamps run ahead
+        assert row["measured"]["value"] == pytest.approx(grown_s, abs=0.32e-3)
+    amount, unit = horizon.split()
+    told = f"over the spec's horizon of {horizon}" in row["evidence"]
+    assert told == (length_s != float(amount) * {"min": 60.0, "h": 3600.0}[unit])
