@@ -51,7 +51,7 @@ def systems(kind: str, count: int, seed: int, whole: bool) -> Iterator[Held]:
     """Every reading's interval of so many systems."""
     from syncline_design.diagnosis.fitting import fit
     from syncline_design.diagnosis.noise_split import factors
-    from syncline_design.diagnosis.run import examined, prepared
+    from syncline_design.diagnosis.searched import examined, prepared
     from syncline_design.diagnosis.settings import DiagnosisSettings
     from syncline_design.diagnosis.system import measured
     from syncline_design.spec.load import load

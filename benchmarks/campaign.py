@@ -45,7 +45,7 @@ from syncline_design.campaign.naming import Naming
 from syncline_design.campaign.pool import Pool, Scoped, Term, fitted, pool_of
 from syncline_design.campaign.store import read_store
 from syncline_design.diagnosis.fitting import finely, fit
-from syncline_design.diagnosis.run import prepared
+from syncline_design.diagnosis.searched import prepared
 from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.sufficient import Less, Sufficient, sufficient
 from syncline_design.diagnosis.system import measured

@@ -37,7 +37,8 @@ import numpy as np
 from benchmarks.study_scoring import proportion
 from syncline_design.diagnosis import DiagnosisSettings
 from syncline_design.diagnosis.consequence import promise_of
-from syncline_design.diagnosis.run import WeighedUp, examined, weigh
+from syncline_design.diagnosis.run import WeighedUp, weigh
+from syncline_design.diagnosis.searched import examined
 from syncline_design.diagnosis.system import measured, pinned_system
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.model.system import System

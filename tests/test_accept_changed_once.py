@@ -14,7 +14,7 @@ from syncline_design.diagnosis.candidates import Candidate, Signature
 from syncline_design.diagnosis.changed_instead import changed_instead
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.once_changed import once_changed
-from syncline_design.diagnosis.run import SearchedLog
+from syncline_design.diagnosis.searched import SearchedLog
 from syncline_design.diagnosis.stretch_windows import BlockSums, cumulated
 from syncline_design.diagnosis.stretches import Stands, in_stretches
 from syncline_design.effects import registry

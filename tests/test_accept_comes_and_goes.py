@@ -18,10 +18,9 @@ from syncline_design.diagnosis.built import _seen as seen_in
 from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.fitting import fit
 from syncline_design.diagnosis.frozen import frozen
-from syncline_design.diagnosis.run import SearchedLog
-from syncline_design.diagnosis.run import _slip as slip_of
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.search import SearchResult
+from syncline_design.diagnosis.searched import SearchedLog, slip_of
 from syncline_design.diagnosis.spans import StampSpan
 from syncline_design.diagnosis.stretches import stretches
 from syncline_design.diagnosis.system import measured

@@ -29,8 +29,8 @@ from syncline_design.diagnosis.limits import beyond_limits
 from syncline_design.diagnosis.noise import first_guess
 from syncline_design.diagnosis.noise_split import factors
 from syncline_design.diagnosis.result import Diagnosis
-from syncline_design.diagnosis.run import prepared
 from syncline_design.diagnosis.scene import Scene
+from syncline_design.diagnosis.searched import prepared
 from syncline_design.diagnosis.stretches import Stretches, stretches
 from syncline_design.diagnosis.system import measured
 from syncline_design.diagnosis.undone import BUILD, left_open

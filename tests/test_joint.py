@@ -26,7 +26,7 @@ from syncline_design.cli.app import app
 from syncline_design.diagnosis import DiagnosisSettings
 from syncline_design.diagnosis.noise import row_covariance
 from syncline_design.diagnosis.result import Estimate
-from syncline_design.diagnosis.run import examined
+from syncline_design.diagnosis.searched import examined
 from syncline_design.diagnosis.sufficient import Less, Sufficient, shown_level, sufficient
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry

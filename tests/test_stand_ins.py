@@ -14,7 +14,8 @@ from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.diagnosis.finding import finding
 from syncline_design.diagnosis.fitting import fit
 from syncline_design.diagnosis.result import Diagnosis, Estimate
-from syncline_design.diagnosis.run import prepared, stand_ins
+from syncline_design.diagnosis.run import stand_ins
+from syncline_design.diagnosis.searched import prepared
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
 from syncline_design.spec.load import load

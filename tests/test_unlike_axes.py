@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.fitting import fit
-from syncline_design.diagnosis.run import prepared
 from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.searched import prepared
 from syncline_design.diagnosis.system import measured
 from syncline_design.diagnosis.unlike_readings import unlike_readings
 from syncline_design.spec.load import load

@@ -12,8 +12,8 @@ import pytest
 from syncline_design.diagnosis import DiagnosisSettings
 from syncline_design.diagnosis.fitting import fit
 from syncline_design.diagnosis.remainder import Remainder, remainder
-from syncline_design.diagnosis.run import _started
 from syncline_design.diagnosis.search import SearchResult
+from syncline_design.diagnosis.searched import started
 from syncline_design.diagnosis.spans import StampSpan
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.unseen_block import unseen_block
@@ -46,13 +46,13 @@ def world(*effects: Hidden) -> WorldLog:
 def test_the_block_is_in_nothing_that_was_found_without_it(tmp_path: Path) -> None:
     log = world(LATE)
     inputs = inputs_of(log, tmp_path)
-    search = _started(inputs, inputs.log, DiagnosisSettings())
+    search = started(inputs, inputs.log, DiagnosisSettings())
     result = search.run()
     stamps: list[float] = []
 
     def spied(rows: Log) -> object:
         stamps.extend(rows.time_s)
-        return _started(inputs, rows, DiagnosisSettings())
+        return started(inputs, rows, DiagnosisSettings())
 
     block = unseen_block(search.data, result, spied)  # type: ignore[arg-type]
     assert block is not None
@@ -73,7 +73,7 @@ def test_the_block_is_in_nothing_that_was_found_without_it(tmp_path: Path) -> No
 
 def test_where_nothing_moves_the_mean_no_block_is_kept_back(tmp_path: Path) -> None:
     inputs = inputs_of(world(), tmp_path)
-    search = _started(inputs, inputs.log, DiagnosisSettings())
+    search = started(inputs, inputs.log, DiagnosisSettings())
     base = fit(search.data)
     result = SearchResult(base, search.settled(base))
     assert unseen_block(search.data, result, lambda _: search) is None
@@ -81,7 +81,7 @@ def test_where_nothing_moves_the_mean_no_block_is_kept_back(tmp_path: Path) -> N
 
 def test_what_the_rest_does_not_bear_out_goes(tmp_path: Path) -> None:
     inputs = inputs_of(world(), tmp_path)
-    search = _started(inputs, inputs.log, DiagnosisSettings())
+    search = started(inputs, inputs.log, DiagnosisSettings())
     bias = next(c for c in search.proposals.candidates if c.label[:2] == ("range_bias", "ranging"))
     claimed = fit(search.data, [bias.acting({"bias_m": 0.02})])
     assert claimed.labels == (bias.label,)
@@ -94,7 +94,7 @@ def test_what_the_rest_does_not_bear_out_goes(tmp_path: Path) -> None:
 
 def left_in(log: WorldLog, folder: Path) -> Remainder:
     inputs = inputs_of(log, folder)
-    search = _started(inputs, inputs.log, DiagnosisSettings())
+    search = started(inputs, inputs.log, DiagnosisSettings())
     rng = np.random.default_rng(3)
     return remainder(search.data, fit(search.data), rng, search.proposals.candidates)
 

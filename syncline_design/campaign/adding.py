@@ -11,7 +11,8 @@ from syncline_design.campaign.kept import NamedAlone, Run, date_of, statistics_o
 from syncline_design.diagnosis.consequence import SpecPromise
 from syncline_design.diagnosis.one_of_several import rivals_words
 from syncline_design.diagnosis.result import Finding
-from syncline_design.diagnosis.run import SearchedLog, examined, weigh
+from syncline_design.diagnosis.run import weigh
+from syncline_design.diagnosis.searched import SearchedLog, examined
 from syncline_design.diagnosis.settings import DiagnosisSettings, SearchProgress, silent
 from syncline_design.diagnosis.sufficient import sufficient
 from syncline_design.diagnosis.system import measured

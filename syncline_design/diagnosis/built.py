@@ -31,8 +31,9 @@ from syncline_design.diagnosis.motion_columns import with_slopes
 from syncline_design.diagnosis.noise_split import NoiseFactors, factors, stated_m
 from syncline_design.diagnosis.one_course import OneCourse
 from syncline_design.diagnosis.result import Diagnosis
-from syncline_design.diagnosis.run import SearchedLog, examined, told
+from syncline_design.diagnosis.run import told
 from syncline_design.diagnosis.scene import Scene, scene
+from syncline_design.diagnosis.searched import SearchedLog, examined
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.stretch_ends import MARGIN_ROWS
