@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from syncline_design.auditing.result import Audit, StampFault, StreamAudit
@@ -22,6 +23,7 @@ _LATE: Final = "stamped_on_arrival"  # as a design may mean it
 # Messages of which the worst one is, with 95 % confidence, beyond 95 % of all: 0.95^59 < 0.05
 # (Wilks, Ann. Math. Stat. 12, 1941); fewer bear no bound out.
 LEAST_MESSAGES: Final = 59
+ENDED: Final = 0.95  # of the log: what stops before that has stopped
 
 
 def by_stamps(one: Assumed, found: Audit, horizon_s: float) -> Judgement | None:
@@ -34,7 +36,7 @@ def by_stamps(one: Assumed, found: Audit, horizon_s: float) -> Judgement | None:
     if stream is None or one.value is None:
         return None
     faults = [f for f in stream.faults if f.counts and not (one.on_arrival and f.fault == _LATE)]
-    own = [f for f in faults if f.fault not in _ON_THE_WAY]
+    own = [_going_on(f, stream) for f in faults if f.fault not in _ON_THE_WAY]
     if faults:
         words = "; ".join(f"{f.fault}: {f.evidence}" for f in own or faults)
         words += _over_horizon(own, stream, horizon_s)
@@ -89,6 +91,12 @@ def _beyond(faults: Sequence[StampFault], stream: StreamAudit, horizon_s: float)
     lasts_s = max((stream.duration_s or 0.0) - horizon_s, 0.0)
     rates = (fault.parameters["ppm"] for fault in faults if _drifts(fault))
     return sum(max(rate, 0.0) * 1e-6 * lasts_s for rate in rates if isinstance(rate, float))
+
+
+def _going_on(fault: StampFault, stream: StreamAudit) -> StampFault:
+    """A drift that the end of the log alone ends has none: it grows on."""
+    ends = fault.to_s is not None and fault.to_s < ENDED * (stream.duration_s or 0.0)
+    return fault if ends or "ppm" not in fault.parameters else replace(fault, to_s=None)
 
 
 def _drifts(fault: StampFault) -> bool:
