@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from syncline_design.campaign.kept import Run
+from syncline_design.campaign.lasting_noise import within_lasting_noise
 from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
 from syncline_design.campaign.pool import Fitted, Pool, Scoped, Term, fitted
 from syncline_design.campaign.sight import limits_of
@@ -152,16 +153,20 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
         )
         for own in said
     )
-    words = evidence_words(one.gain, one.log_p / math.log(10.0), noise_kept=True)
+    constant = within_lasting_noise(
+        told.named.fit, k, pinned_system(told.case), positions=told.runs[0].kind == "position"
+    )
+    log10_p, changing = one.log_p / math.log(10.0), constant is not None
+    words = evidence_words(one.gain, log10_p, noise_kept=True, changing=changing)
     aliases = tuple(_rival(told, b) for b in one.rivals)
     total = 1.0 + sum(odds(b.nats_worse) for b in aliases)
     aliases = tuple(replace(b, probability=odds(b.nats_worse) / total) for b in aliases)
     found = finding(
-        effect, term.sensor, stage, shown, words, one.gain, one.log_p / math.log(10.0),
+        effect, term.sensor, stage, shown, words, one.gain, log10_p,
         (aliases, (), ()), material, size_m,
     )  # fmt: skip
     tested = one.tested.logs if one.tested.starts is None else one.tested.starts
-    found = replace(found, scope=scope, one_value=tested,
+    found = replace(found, scope=scope, one_value=tested, within_noise=constant,
                     probability=1.0 / total if aliases else None)  # fmt: skip
     if scope == "build":
         return replace(found, each_log=logs)

@@ -52,4 +52,5 @@ EFFECT = Effect(
     breaks="mounting",
     comes_with="sensor",
     asked_in_stretches=True,
+    constant=(("ranging", 1),),
 )

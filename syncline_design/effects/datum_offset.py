@@ -55,4 +55,5 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=60,
     asked_in_stretches=True,
+    constant=tuple(("position", axis) for axis in range(3)),
 )

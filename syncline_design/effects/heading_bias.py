@@ -50,4 +50,5 @@ EFFECT = Effect(
     breaks="mounting",
     comes_with="sensor",
     asked_in_stretches=True,
+    constant=(("attitude", 2),),
 )

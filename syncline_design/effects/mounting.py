@@ -55,4 +55,5 @@ EFFECT = Effect(
     breaks="mounting",
     asked_in_stretches=True,
     asked_jointly=True,
+    constant=(("attitude", 0), ("attitude", 1)),
 )

@@ -51,4 +51,5 @@ EFFECT = Effect(
     comes_with="sensor",
     asked_in_stretches=True,
     asked_jointly=True,
+    constant=(("ranging", 0),),
 )

@@ -309,8 +309,7 @@ class Effect:
     one of the lower figure, and the other listed as its alias; the order is ours, by judgement.
     opens: which of a log's noise a stochastic one sets free: the "factor" of its sensor, the "slow"
     noise of its sensor or its "down" part alone, the "size" of its own scatter, the "tails", or the
-    white noise of its sensor for an "episode".
-    undoing: a discrete one's.
+    white noise of its sensor for an "episode".  undoing: a discrete one's.
     bounded_by_k: charged with k times its standard deviation, k the coverage factor.
     memory: the parameter that is the time constant of what it remembers, "" of one without memory.
     passing: may come and go while a system is at work; what is built in acts all along.
@@ -321,8 +320,8 @@ class Effect:
     asked_in_stretches: a built system's log is asked for it from any stamp to any other.
     asked_jointly: it is left free where a built system's log is asked for what undoes another; of
     those that break one assumption, one a sensor.
-    sentence: for people, a format string over {sensor} and the parameters.
-    reverse: the sentence of a first parameter below zero, which then stands there by its size.
+    sentence: a format string over {sensor} and the parameters; reverse: of a first one below zero.
+    constant: of its first slopes the readings (sensor, axis) whose errors they are, never changing.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
     commissioned: of which sensors a first drive is asked for it, where nothing else is said.
     implied: no spec lists it; it follows from how often and by what a system measures.
@@ -361,6 +360,7 @@ class Effect:
     commissioned: tuple[ActsOn, ...] = ()
     implied: bool = False
     reverse: str = ""
+    constant: tuple[tuple[RoleName, int], ...] = ()
 
     @property
     def wanders(self) -> bool:

@@ -153,11 +153,18 @@ def _figures_of(one: Finding) -> str:
     return ", ".join(estimate.text for estimate in one.parameters.values())
 
 
-def _noise_instead(noise: WithinNoise) -> str:
+def _noise_instead(found: Finding, noise: WithinNoise) -> str:
+    times, share = numbers.number(noise.sigmas, 2), numbers.percent(noise.chance, 2)
+    if found.scope is None:
+        return (
+            f"It cannot be told from noise of {noise.sensor} that stays the same over the whole "
+            f"log: {times} times the spec's standard deviation does the same, and such noise is as "
+            f"large in {share} of logs."
+        )
     return (
-        f"It cannot be told from noise of {noise.sensor} that stays the same over the whole log: "
-        f"{numbers.number(noise.sigmas, 2)} times the spec's standard deviation does the same, "
-        f"and such noise is as large in {numbers.percent(noise.chance, 2)} of logs."
+        f"It cannot be told from noise of {noise.sensor} that stays the same over each log and is "
+        f"another in the next: at most {times} times the spec's standard deviation does the same, "
+        f"and such noise does as much in {share} of such sets of logs."
     )
 
 
@@ -215,7 +222,7 @@ def finding_node(found: Finding, drive: NextDrive | None = None, *, first: bool 
         *scope_nodes(found),
     ]
     if found.within_noise is not None:
-        nodes.append(Text(_noise_instead(found.within_noise), mark="!", tone="warn"))
+        nodes.append(Text(_noise_instead(found, found.within_noise), mark="!", tone="warn"))
     if found.varying:
         nodes.append(Text(_varying_text(found, found.varying), mark="!"))
     open_ = found.open_aliases
