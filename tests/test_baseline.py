@@ -129,6 +129,18 @@ CASES = {
         0,
         {"M": "gone"},
     ),
+    "met before, missed under a waiver now": (
+        changed(FAILING, (ACCURACY, "limit: 0.5 m")),
+        changed(FAILING, (KIND, f"{KIND}, waiver: {{reason: wire, expires: 2999-01-01}}")),
+        0,
+        {"ACC-1": "worse"},
+    ),
+    "missed under a waiver before, met now": (
+        changed(FAILING, (KIND, f"{KIND}, waiver: {{reason: wire, expires: 2999-01-01}}")),
+        changed(FAILING, (ACCURACY, "limit: 0.5 m")),
+        0,
+        {"ACC-1": "better"},
+    ),
     "infeasible before and now": (OPEN, OPEN, 0, {}),
     "one more cannot be met": (OPEN, changed(OPEN, SYNC), 1, {"SYNC-1": "worse"}),
     "one less cannot be met": (changed(OPEN, SYNC), OPEN, 0, {"SYNC-1": "same"}),  # not judged

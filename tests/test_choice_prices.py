@@ -253,18 +253,25 @@ def test_better_sensor_can_fail_sync_within_its_tolerance() -> None:
 
 
 def test_measure_next_names_what_flips_the_choice(tmp_path: Path) -> None:
-    loaded = spec(tmp_path, accuracy="10 cm")
+    """At the end of its range, already at the nearest value told, and not a 256th of the way
+    before that."""
+    problem, design = chosen(spec(tmp_path, accuracy="0.3 m"))
+    limit = evaluate(problem, design).error_m * 1.02
+    loaded = spec(tmp_path, accuracy=f"{limit!r} m")
     problem, design = chosen(loaded)
     found = measure_next(loaded, problem, design)
+    assert found
     for one in found:
-        assert one.assumed
+        assert one.assumed_tolerance
         figure = next(f for f in sigma_figures(loaded) if f.name == one.figure)
-        other = build_problem(with_figure(loaded, figure, quantity(one.at, figure.dimension)))
-        again = choose(other)
-        flipped = isinstance(again, Infeasible) or payload(other, again.design) != payload(
-            problem, design
-        )
-        assert flipped
+        before = one.nearest - (one.at - one.value) / 255.0
+        for value, flips in ((one.at, True), (one.nearest, True), (before, False)):
+            other = build_problem(with_figure(loaded, figure, quantity(value, figure.dimension)))
+            again = choose(other)
+            flipped = isinstance(again, Infeasible) or payload(other, again.design) != payload(
+                problem, design
+            )
+            assert flipped == flips, (one, value)
 
 
 def test_measure_next_finds_a_flip_and_its_price(tmp_path: Path) -> None:

@@ -10,9 +10,10 @@ never: no errors between the ends satisfy both.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -21,8 +22,16 @@ from syncline_design.choice.core import Beside, best_from, best_with
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import Incumbent, broken, chosen_options, evaluate, rank
 from syncline_design.choice.judged import judgement
+from syncline_design.choice.measured_next import (
+    Ends,
+    Measurement,
+    OtherChoice,
+    changes,
+    ends_tried,
+    weight,
+)
 from syncline_design.choice.options import RESOURCES
-from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
+from syncline_design.choice.outcome import Choice
 from syncline_design.choice.problem import build_problem, selection_of, with_everything
 from syncline_design.choice.slack import payload
 from syncline_design.choice.table import Design, Problem
@@ -43,12 +52,10 @@ from syncline_design.choice.what_if import (
 )
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
-from syncline_design.model.figure_text import format_like
 from syncline_design.spec.case import Case
 from syncline_design.spec.selection import RoleSelection
 
 HowOften = Literal["always", "sometimes", "never"]
-ASSUMED_SPREAD = Fraction(1, 5)  # where a datasheet gives no tolerance, for `measure_next` only
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,30 +226,13 @@ def _span(
     return float(ends[1] - ends[0])
 
 
-@dataclass(frozen=True, slots=True)
-class Measurement(Record):
-    """A datasheet figure that alone changes the choice when it lies at one end of its range.
-
-    value and at are in SI; value_text is the figure as written, at_text the other end in its unit.
-    assumed_tolerance: the datasheet gives no tolerance and 20 % to either side was tried.
-    """
-
-    figure: str
-    value: float
-    at: float
-    value_text: str
-    at_text: str
-    assumed_tolerance: bool
-    becomes: str
-    objective_change: float | None
-
-
 def measure_next(
     case: Case, problem: Problem, design: Design, build: Build = build_problem
 ) -> tuple[Measurement, ...]:
     """Figures that alone flip the choice, the dearest flip first.
 
-    Tried are the ends of every tolerance; where no figure has one, 20 % to either side of each.
+    Tried are the ends of every tolerance; where no figure has one, 20 % to either side of each; and
+    on the way to an end that changes it, where it does first.
     """
     figures = list(sigma_figures(case))
     given = [figure for figure in figures if figure.quantity.has_tolerance]
@@ -251,25 +241,9 @@ def measure_next(
     for figure in asked.worth_trying(
         [(f, ends_tried(f, assumed=not given)) for f in given or figures]
     ):
-        try:
-            found += _flips(asked, figure, assumed=not given)
-        except OutOfTime:
-            raise
-        except NoVerdict:  # what cannot be proven is not claimed
-            continue
+        choice = partial(_other, asked, figure)
+        found += changes(figure, assumed=not given, choice=choice)
     return tuple(sorted(found, key=lambda m: (-weight(m), m.figure, m.at)))
-
-
-Ends = tuple[float, float]
-
-
-def ends_tried(figure: SheetFigure, *, assumed: bool) -> Ends:
-    """The values that are tried."""
-    value = figure.quantity
-    if not assumed:
-        return value.low, value.high
-    spread = value.exact * ASSUMED_SPREAD
-    return float(value.exact - spread), float(value.exact + spread)
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,38 +315,22 @@ class _Asked:
         return best_from(other, at_hand, self.beside, near)
 
 
-def weight(one: Measurement) -> float:
-    """How much the objective changes; where nothing is left to choose, most."""
-    return math.inf if one.objective_change is None else abs(one.objective_change)
-
-
-def _flips(asked: _Asked, figure: SheetFigure, *, assumed: bool) -> Iterator[Measurement]:
+def _other(asked: _Asked, figure: SheetFigure, value: float) -> OtherChoice | None:
+    """What the choice becomes with a figure at a value; None where it stays."""
     now = payload(asked.problem, asked.design)
-    for end in ends_tried(figure, assumed=assumed):
-        other, design = asked.chosen(figure, end)
-        if design is None:
-            yield measurement(figure, end, assumed, "infeasible", None)
-            continue
-        then = payload(other, design)
-        if then != now:
-            changes = [
-                f"{table.role} of {table.stage_name}: {sensor} stamped by {method}"
-                for table, (sensor, method), before in zip(other.roles, then, now, strict=True)
-                if (sensor, method) != before
-            ]
-            change = _objective(other, design) - _objective(asked.problem, asked.design)
-            yield measurement(figure, end, assumed, "; ".join(changes), change)
-
-
-def measurement(
-    figure: SheetFigure, end: float, assumed: bool, becomes: str, change: float | None
-) -> Measurement:
-    """A figure, the end at which the choice flips, and what it becomes."""
-    value = figure.quantity
-    return Measurement(
-        figure.name, float(value), end, value.text, format_like(value.text, end), assumed, becomes,
-        change,
-    )  # fmt: skip
+    other, design = asked.chosen(figure, value)
+    if design is None:
+        return OtherChoice("infeasible", None)
+    then = payload(other, design)
+    if then == now:
+        return None
+    told = [
+        f"{table.role} of {table.stage_name}: {sensor} stamped by {method}"
+        for table, (sensor, method), before in zip(other.roles, then, now, strict=True)
+        if (sensor, method) != before
+    ]
+    change = _objective(other, design) - _objective(asked.problem, asked.design)
+    return OtherChoice("; ".join(told), change)
 
 
 def _objective(problem: Problem, design: Design) -> float:

@@ -9,6 +9,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.charts import BEYOND, LAX, WIDTH
+from syncline_design.report.columns import errors
 from syncline_design.report.palette import BAD, INK, SERIES, WARN
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
@@ -48,18 +49,21 @@ class _Mark:
 
 
 def _marks(data: DensityBars) -> list[_Mark]:
-    found = [_mark(word, value, INK, data.limit) for word, value in data.marks]
+    """The quantiles, the limit, the Syncline; figures to as many digits as one another."""
+    named = [(word, value, INK) for word, value in data.marks]
+    if data.syncline_m is not None:
+        named.append(("Syncline", data.syncline_m, BAD))
+    values = [value for _, value, _ in named]
+    labels, spoken = errors(values, data.limit, 3), errors(values, data.limit)
+    found = [
+        _Mark(value, f"{word} {label}", f"{word} at {said}", colour)
+        for (word, value, colour), label, said in zip(named, labels, spoken, strict=True)
+    ]
     if data.limit is not None:
         words = numbers.limit(data.limit)
-        found.append(_Mark(data.limit.limit, f"limit {words}", f"limit at {words}", WARN))
-    if data.syncline_m is not None:
-        found.append(_mark("Syncline", data.syncline_m, BAD, data.limit))
+        limit = _Mark(data.limit.limit, f"limit {words}", f"limit at {words}", WARN)
+        found.insert(len(data.marks), limit)
     return found
-
-
-def _mark(word: str, value_m: float, colour: str, limit: numbers.Limited | None) -> _Mark:
-    label, spoken = numbers.error(value_m, limit, 3), numbers.error(value_m, limit)
-    return _Mark(value_m, f"{word} {label}", f"{word} at {spoken}", colour)
 
 
 def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineChart:

@@ -53,7 +53,7 @@ def pareto_front(
         costs = [p.cost for p in points]
         near = cost_limit if cost_limit and cost_limit <= LAX * max(costs, default=0.0) else None
         around = scales.in_view(cloud, costs, max(p.error_m for p in points), near)
-        _staircase(axes, points, scales.price_axis(costs, near, [p.cost for p in around]))
+        _staircase(axes, points, scales.price_axis(costs, near, [p.cost for p in around]), near)
         errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
         errors += [p.error_m for p in around]
         _cloud(axes, around)
@@ -106,12 +106,17 @@ def _says(point: FrontMark, currency: str, limit: numbers.Limited | None) -> lis
             ("Error", numbers.error(point.error_m, limit))]  # fmt: skip
 
 
-def _staircase(axes: Axes, points: Sequence[FrontMark], ends: tuple[float, float]) -> None:
+def _staircase(
+    axes: Axes, points: Sequence[FrontMark], ends: tuple[float, float], most: float | None
+) -> None:
+    """The front, as far as prices may go; most: the limit on cost, where it is in view."""
     costs = [p.cost for p in points]
     errors = [p.error_m for p in points]
     left, right = ends
     axes.set_yscale("log")
-    axes.step([*costs, right], [*errors, errors[-1]], where="post", color=LINE, linewidth=2)
+    last = right if most is None else max(most, costs[-1])
+    axes.step([*costs, last], [*errors, errors[-1]], where="post", color=LINE, linewidth=2,
+              label="front")  # fmt: skip
     axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)
     for point in points:
         if point.chosen:

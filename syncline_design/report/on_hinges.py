@@ -27,11 +27,12 @@ def hinges_nodes(hinges: Optimization, limit: numbers.Limited | None) -> list[No
         words = "No single datasheet figure, 20 % up or down, changes the choice."
         return [*nodes, Text(words)]
     rows = [
-        (one.figure, one.value_text, one.at_text,
-         "20 % assumed" if one.assumed_tolerance else "datasheet tolerance", one.becomes)
+        (one.figure, one.value_text, one.nearest_text, one.nearest_becomes,
+         f"{one.at_text}, {'20 % assumed' if one.assumed_tolerance else 'datasheet tolerance'}",
+         "the same" if one.becomes == one.nearest_becomes else one.becomes)
         for one in hinges.measure_next
     ]  # fmt: skip
-    heads = ("Figure", "Now", "Flips at", "Range", "The choice becomes")
+    heads = ("Figure", "Now", "Changes from", "The choice becomes", "End of its range", "There")
     caption = "What to measure next: a single figure that changes the choice"
     return [*nodes, *show(table(caption, heads, rows))]
 

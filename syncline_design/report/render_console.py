@@ -132,11 +132,12 @@ def _terms(pairs: Sequence[tuple[str, Inline]], indent: str) -> Iterator[str]:
 
 
 def _pairs(pairs: Sequence[tuple[str, Inline]], indent: str) -> Iterator[str]:
-    """Label and value, the values lined up."""
+    """Label and value, the values lined up; below its label what is too long beside it."""
     width = max((len(_shown(label)) for label, _ in pairs), default=0) + 2
-    narrow = width > columns() // 2
+    room = columns() - len(indent) - width
     for label, value in pairs:
-        if narrow:
+        longest = max(map(len, plain(value).split(" ")))
+        if width > columns() // 2 or longest > room:
             yield from _wrapped(f"{plain(label)}: {plain(value) or '-'}", f"{indent}  ", indent)
             continue
         head = f"{indent}{_shown(label).ljust(width)}"

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 def tightest_limit(
     verdict: Verdict | Summary | MissionVerdict, kind: str
 ) -> RequirementResult | None:
-    """The requirement with the tightest limit of a kind."""
+    """The requirement with the tightest limit of a kind, of those that are waived the last."""
     rows = (row for row in verdict.requirements if row.kind == kind)
-    return min(rows, key=lambda row: row.limit, default=None)
+    return min(rows, key=lambda row: (row.is_waived, row.limit), default=None)
 
 
 def front_limit(verdict: Verdict) -> RequirementResult | None:
@@ -244,8 +244,8 @@ def choice_chart(verdict: Verdict) -> list[Node]:
         return pareto_front(drawn, currency, limit, price, cloud=around)
 
     caption = (
-        "Every design on the line is the cheapest with that error; nothing exists below and left "
-        "of it."
+        "Every design on the line is the cheapest with that error; nothing that keeps the other "
+        "requirements exists below and left of it."
     ) + _cloud_words(cloud, near, verdict.spec.combinations)
     return [Chart("choice", draw, caption)] if len(points) > 1 else []
 

@@ -261,9 +261,10 @@ def failing_text(rows: Sequence[RequirementResult]) -> str:
 
 
 def tightest(rows: Sequence[RequirementResult]) -> RequirementResult | None:
-    """The requirement with the least relative margin."""
-    known = [row for row in rows if relative_margin(row) is not None]
-    return min(known, key=lambda row: relative_margin(row) or 0.0) if known else None
+    """The requirement with the least relative margin; a waived one where there is no other."""
+    known = [(row.is_waived, margin, k) for k, row in enumerate(rows)
+             if (margin := relative_margin(row)) is not None]  # fmt: skip
+    return rows[min(known)[2]] if known else None
 
 
 def term_text(entry: LedgerRow) -> str:

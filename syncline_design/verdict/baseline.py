@@ -172,7 +172,10 @@ def _fell(verdict: Judged, before: Judged) -> bool:
 
 
 def _since(now: RequirementResult, then: RequirementResult) -> SinceBaseline:
+    """A miss that a waiver covers is worse than none, though it fails nothing."""
     step = _standing(now) - _standing(then)
+    if step == 0:
+        step = _STATUSES.index(now.status) - _STATUSES.index(then.status)
     both_missed = now.status == then.status == "fail"
     if both_missed and step <= 0 and now.unit == then.unit:  # a waiver makes no figure better
         step = _further(now, then) - _further(then, now)

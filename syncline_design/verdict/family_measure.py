@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
@@ -16,10 +17,16 @@ from syncline_design.choice.family import Family
 from syncline_design.choice.family_core import unguarded
 from syncline_design.choice.family_parts import narrowed_family, ways_with
 from syncline_design.choice.family_roads import choose_by_road
+from syncline_design.choice.measured_next import (
+    Measurement,
+    OtherChoice,
+    changes,
+    ends_tried,
+    weight,
+)
 from syncline_design.choice.outcome import NoVerdict, OutOfTime
 from syncline_design.choice.slack import payload
 from syncline_design.choice.table import Design, Problem
-from syncline_design.choice.tolerance import Measurement, ends_tried, measurement, weight
 from syncline_design.choice.variations import (
     Build,
     SheetFigure,
@@ -45,11 +52,11 @@ def measure_next(work: Work, chosen: Chosen, build: Callable[[], Build]) -> tupl
     tried = [(one, ends_tried(one, assumed=not given)) for one in given or every.values()]
     known = _sensors_that_matter(work, chosen, tried)
     found: list[Measurement] = []
-    for figure, ends in tried:
+    for figure, _ in tried:
         if figure.sensor not in known:
             continue
-        for end in ends:
-            found += _flip(work, chosen, build, figure, end, assumed=not given)
+        choice = partial(_other, work, chosen, build, figure)
+        found += changes(figure, assumed=not given, choice=choice)
     return tuple(sorted(found, key=lambda one: (-weight(one), one.figure, one.at)))
 
 
@@ -115,11 +122,10 @@ def _better(problem: Problem, sensor: str, share: float) -> Problem:
     return problem
 
 
-def _flip(
-    work: Work, chosen: Chosen, build: Callable[[], Build], figure: SheetFigure, end: float,
-    *, assumed: bool,
-) -> Iterator[Measurement]:  # fmt: skip
-    """What the choice becomes with a figure at an end, if that is another one."""
+def _other(
+    work: Work, chosen: Chosen, build: Callable[[], Build], figure: SheetFigure, end: float
+) -> OtherChoice | None:
+    """What the choice becomes with a figure at a value; None where it stays."""
     in_force().check()
     assert chosen.found is not None
     value = quantity(end, figure.dimension)
@@ -132,20 +138,14 @@ def _flip(
             numbers = numbers_of(case, problem)
             problems.append(with_sheet_figure(case, problem, numbers, figure, value))
     other = with_problems(work, problems)
-    try:
-        found = None if other.family.is_empty else choose_by_road(other.family, "front").found
-    except OutOfTime:
-        raise
-    except NoVerdict:  # what cannot be proven is not claimed
-        return
+    found = None if other.family.is_empty else choose_by_road(other.family, "front").found
     if found is None:
-        yield measurement(figure, end, assumed, "infeasible", None)
-        return
+        return OtherChoice("infeasible", None)
     designs = other.family.designs(found.design)
-    changes = list(_changes(work, chosen, problems, designs))
-    if changes:
-        change = _amount(found.rank[0]) - _amount(chosen.found.rank[0])
-        yield measurement(figure, end, assumed, "; ".join(changes), change)
+    told = list(_changes(work, chosen, problems, designs))
+    if not told:
+        return None
+    return OtherChoice("; ".join(told), _amount(found.rank[0]) - _amount(chosen.found.rank[0]))
 
 
 def _amount(value: Fraction | float) -> float:

@@ -6,6 +6,7 @@ from dataclasses import fields
 from typing import Annotated
 
 from syncline_design import __version__
+from syncline_design.choice.measured_next import Measurement
 from syncline_design.choice.option import ResourceName
 from syncline_design.choice.outcome import (
     Explanation,
@@ -16,10 +17,7 @@ from syncline_design.choice.outcome import (
 )
 from syncline_design.choice.slack import Slack
 from syncline_design.choice.table import Design, Limits, Problem
-from syncline_design.choice.tolerance import (
-    Measurement,
-    ToleranceVerdict,
-)
+from syncline_design.choice.tolerance import ToleranceVerdict
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, SchemaName, optional
