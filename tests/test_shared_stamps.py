@@ -110,6 +110,33 @@ def test_velocities_of_the_antenna_are_told_from_those_of_the_vehicle(
         assert _rms(view.log.stages[0].velocity_mps - truth) < 0.05
 
 
+@pytest.mark.parametrize("platform", ["car_stops", "vessel_figure_eights"])
+@pytest.mark.parametrize("seed", range(3))
+def test_so_are_they_in_a_log_of_positions(platform: str, seed: int, tmp_path: Path) -> None:
+    """Of places 60 ms late beside a better system; an arm that is not there at all is no sweep."""
+    run = scenario(platform, 20 + seed, 120.0, 5.0, "position")
+    arm_m = run.carriers[0].sensors.antenna_arm_m
+    none = dict(zip(("x_m", "y_m", "z_m"), (-one for one in arm_m), strict=True))
+    late = hidden("latency", "position", latency_s=LATE_S)
+    whole, bare = make_log(run, (late,)), make_log(run, (hidden("lever_arm", "position", **none),))
+    truth = run.carriers[0].path.velocity(whole.columns["time_s"])
+    for log, antenna in ((whole, False), (bare, False), (of_its_antenna(whole, 0.0), True)):
+        view = seen(log, tmp_path)
+        assert len([note for note in view.log.notes if "its antenna's" in note]) == antenna
+        assert _rms(view.log.stages[0].velocity_mps - truth) < 0.05
+
+
+def test_a_delay_of_places_beside_velocities_of_the_antenna_is_the_true_one(tmp_path: Path) -> None:
+    """On a vessel, whose antenna swings as fast as the vessel goes."""
+    run = scenario("vessel_figure_eights", 21, 120.0, 5.0, "position")
+    late = hidden("latency", "position", latency_s=LATE_S)
+    found: Document = ask(of_its_antenna(make_log(run, (late,)), 0.0), tmp_path)
+    (finding,) = (one for one in found["findings"] if one["material"])
+    assert (finding["effect"], finding["sensor"]) == ("latency", "position")
+    value = finding["parameters"]["latency_s"]
+    assert abs(value["value"] - LATE_S) < 4.0 * value["standard_uncertainty"]
+
+
 @pytest.mark.parametrize("forward_m", [0.4, -0.4])
 def test_an_arm_that_is_off_is_no_lag_of_the_velocities(forward_m: float, tmp_path: Path) -> None:
     """In a turn the antenna ahead of where it is taken to be passes every place earlier."""

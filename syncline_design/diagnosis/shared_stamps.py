@@ -56,9 +56,9 @@ def with_shared_stamps(log: Log, view: Scene) -> Log:
 
     Of a log of positions the better system's stamps are true.  A note says which are another's.
     """
+    log, view = _of_the_reference_point(log, view)
     if log.kind == "position":
         return log
-    log, view = _of_the_reference_point(log, view)
     stages, notes = [], []
     for k, stage in enumerate(log.stages):
         rates, velocities = rates_apart(view, k), None
@@ -113,7 +113,11 @@ def _nats(own: Apart, other: Apart) -> float:
 
 
 def _lags_of_velocity(view: Scene) -> list[Apart | None]:
-    return _lags(view, 0, view.rows[0].position_m, view.motions[0].velocity)
+    """By the better system's places where there are any: the tested arm may be off."""
+    place_m, truth_m = view.rows[0].position_m, view.log.truth_m
+    if view.log.kind == "position" and np.all(np.isfinite(truth_m)):
+        place_m = truth_m
+    return _lags(view, 0, place_m, view.motions[0].velocity)
 
 
 def _notes(stage: str, slopes: str, poses: str, found: Apart | None) -> list[str]:
