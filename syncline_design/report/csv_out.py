@@ -98,7 +98,7 @@ def _rows(verdict: Verdict) -> Iterator[dict[str, Any]]:
             w.code for w in verdict.warnings
             if w.requirement == row.id and (not w.missions or mission in w.missions)
         )  # fmt: skip
-        told = {"requirement": row.id, "warnings": codes, "waiver": waiver_text(row)}
+        told = {"requirement": row.id, "warnings": codes, "waiver": waiver_text(row, mission)}
         one = since.get((mission, row.id))
         earlier = {} if one is None else _then(verdict, one)
         status = {"status": status_id(row), "mission": mission or ""}

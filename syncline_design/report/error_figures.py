@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from syncline_design.report import numbers, verdict_charts
-from syncline_design.report.document import Group, Inline, Node, Text, code, show
+from syncline_design.report.document import Group, Node, Span, Text, code, show
 from syncline_design.report.table import Cell, Table, table
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Row = tuple[str, float | None, float | None, str]  # name, over missions, one mission, what it is
 SHOWN_SHARE = 0.001
-LEAD: Final[Inline] = (
+LEAD: Final[tuple[str | Span, ...]] = (
     "Three figures that claim three things. Each holds for the worst situation that the spec "
     "allows: directions of motion, rotation and look, lean up to the horizon's tilt, time and "
     "place; where no ",
@@ -34,7 +34,7 @@ def error_figures(verdict: Verdict) -> list[Node]:
         return []
     limit = verdict_charts.tightest_limit(verdict, "accuracy")
     return [
-        Text(LEAD),
+        Text((*LEAD, verdict_charts.of_mission(verdict))),
         *show(_figures(found, limit), silent=True),
         *_makers(found),
         *(Text(text, quiet=True) for text in _situation(found)),

@@ -101,7 +101,8 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
 def _at_a_glance(verdict: Verdict) -> list[Node]:
     """Requirements, and in three figures where the error comes from, its timing, its spread."""
     total = None if verdict.syncline is None else verdict.syncline.total_m
-    spread = [] if verdict.monte_carlo is None else histogram_chart(verdict.monte_carlo, total)
+    simulated, mission = verdict.monte_carlo, verdict_charts.of_mission(verdict)
+    spread = [] if simulated is None else histogram_chart(simulated, total, mission)
     figures = (
         *verdict_charts.ledger_chart(verdict), *verdict_charts.timing_chart(verdict), *spread,
     )  # fmt: skip

@@ -88,8 +88,8 @@ def span(first: str, last: str) -> str:
     return first if first == last else f"{first} to {last}"
 
 
-def histogram_chart(found: MonteCarlo, syncline_m: float | None) -> list[Node]:
-    """The distribution of the simulated error."""
+def histogram_chart(found: MonteCarlo, syncline_m: float | None, mission: str = "") -> list[Node]:
+    """The distribution of the simulated error; mission: a sentence on whose it is."""
     bins, within = found.histogram, found.probability_within_target
     marks = tuple(
         (numbers.percent(float(key), 4), entry.value_m)
@@ -106,7 +106,7 @@ def histogram_chart(found: MonteCarlo, syncline_m: float | None) -> list[Node]:
         "Density of the error of the simulated samples, with quantiles, limit and Syncline where "
         "known."
     )
-    return [Chart("histogram", draw, caption)]
+    return [Chart("histogram", draw, caption + mission)]
 
 
 def along_chart(found: MonteCarlo) -> list[Node]:

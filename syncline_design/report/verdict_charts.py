@@ -26,9 +26,25 @@ if TYPE_CHECKING:
 def tightest_limit(
     verdict: Verdict | Summary | MissionVerdict, kind: str
 ) -> RequirementResult | None:
-    """The requirement with the tightest limit of a kind, of those that are waived the last."""
-    rows = (row for row in verdict.requirements if row.kind == kind)
+    """The requirement with the tightest limit of a kind, of those that are waived the last; of
+    several missions of the one whose figures are shown."""
+    shown = shown_mission(verdict)
+    judged = verdict if shown is None else shown
+    rows = (row for row in judged.requirements if row.kind == kind)
     return min(rows, key=lambda row: (row.is_waived, row.limit), default=None)
+
+
+def shown_mission(verdict: Verdict | Summary | MissionVerdict) -> MissionVerdict | None:
+    """Of several missions the one whose ledger and figures a verdict has for its own."""
+    missions: tuple[MissionVerdict, ...] = getattr(verdict, "missions", None) or ()
+    own = getattr(verdict, "syncline", None)
+    return next((one for one in missions if own is not None and one.syncline == own), None)
+
+
+def of_mission(verdict: Verdict) -> str:
+    """What a figure of one of several missions says below it, ` Of mission low.`"""
+    shown = shown_mission(verdict)
+    return "" if shown is None else f" Of mission {shown.name}."
 
 
 def front_limit(verdict: Verdict) -> RequirementResult | None:
@@ -71,7 +87,7 @@ def syncline_chart(verdict: Verdict) -> list[Node]:
         "Slope: motion during the timestamp error. Marker: this design. Dotted, where drawn: with "
         "the lever arm's rotation."
     )
-    return [Chart("syncline", draw, caption)]
+    return [Chart("syncline", draw, caption + of_mission(verdict))]
 
 
 def _floor_m(syncline: SynclineFigures) -> float:
@@ -134,7 +150,7 @@ def timing_chart(verdict: Verdict) -> list[Node]:
         "Bar: timestamp error of the chosen timestamping. Mark: the sensor's \u03c4_crit. "
         "Logarithmic."
     )
-    return [Chart("timing", draw, caption)] if roles else []
+    return [Chart("timing", draw, caption + of_mission(verdict))] if roles else []
 
 
 def clocks_chart(verdict: Verdict) -> list[Node]:
@@ -191,7 +207,7 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
         "Terms add up to the total. Plain: sensor noise. Hatched: synchronisation. Crossed: known "
         "effects. Dotted: between samples."
     )
-    return [Chart("ledger", draw, caption)] if entries else []
+    return [Chart("ledger", draw, caption + of_mission(verdict))] if entries else []
 
 
 def _cloud_words(

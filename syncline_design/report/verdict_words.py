@@ -176,13 +176,15 @@ def quantity_then(was: Earlier) -> str:
     return "" if was.kind is None else kind_words(was.kind, was.quantile, was.axis)
 
 
-def waiver_text(row: RequirementResult) -> str:
-    """`waived until 2027-01-31: reason`, or why it does not count."""
+def waiver_text(row: RequirementResult, mission: str | None = None) -> str:
+    """`waived until 2027-01-31: reason`, or why it does not count; in a mission where it is of one:
+    another may need it."""
     waiver = row.waiver
     if waiver is None:
         return ""
     if row.status == "pass":
-        return f"its waiver (until {waiver.expires}: {waiver.reason}) is not needed"
+        where = "" if mission is None else " in this mission"
+        return f"its waiver (until {waiver.expires}: {waiver.reason}) is not needed{where}"
     state = "waiver expired on" if waiver.expired else "waived until"
     return f"{state} {waiver.expires}: {waiver.reason}"
 

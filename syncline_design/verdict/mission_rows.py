@@ -94,8 +94,10 @@ def _with_sum(
     return replace(row, status="pass" if passed else "fail", value=float(amount), margin=margin)
 
 
-def least_margin(rows: Sequence[RequirementResult]) -> float:
-    shares = [row.margin / row.limit for row in rows if row.margin is not None and row.limit]
+def least_own_margin(rows: Sequence[RequirementResult]) -> float:
+    """By how much of a limit a mission's own figures stay below it; budgets are all missions'."""
+    own = [row for row in rows if row.kind not in BUDGETS]
+    shares = [row.margin / row.limit for row in own if row.margin is not None and row.limit]
     return min(shares, default=math.inf)
 
 

@@ -42,7 +42,7 @@ from syncline_design.verdict.likely import CONFIDENCE
 from syncline_design.verdict.mission_rows import (
     JudgedMission,
     family_rows,
-    least_margin,
+    least_own_margin,
     with_sums,
     worst_rows,
 )
@@ -148,7 +148,7 @@ def _verdict_on(
             replace(one, alone=pieces.made(f"{one.mission.name} alone", choose, None))
             for one, choose in ((one, _alone(one, build, work.seed)) for one in judged)
         ]
-    shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], least_margin(one.rows)))
+    shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], least_own_margin(one.rows)))
     nothing: Robustness | None = None
     robust = nothing
     if work.case.spec.choose_for != "nominal":
@@ -370,7 +370,7 @@ def _warnings(
         yield Caution(
             "mission-shown",
             f"ledger, figures and simulation are those of mission {name}, the one nearest to a "
-            "limit; every mission's own are in the table of missions",
+            "limit of its own; every mission's own are in the table of missions",
         )
     yield from _differing_roles(judged)
     seen: dict[Caution, list[str]] = {}
