@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from syncline_design.diagnosis import diagnose
 from syncline_design.diagnosis.hanging_rows import without_hanging
@@ -43,3 +44,14 @@ def test_an_attitude_in_radians_that_hangs_does(tmp_path: Path) -> None:
     assert hanging.left_out
     kept = np.isin(inputs.log.time_s, less.log.time_s)
     assert not np.any(kept[ROWS])
+
+
+@pytest.mark.parametrize("name", ANGLES)
+def test_one_angle_in_radians_that_hangs_does(name: str, tmp_path: Path) -> None:
+    """All angles rest within their noise; in degrees the one that hangs is left behind."""
+    inputs = read(_in_radians(tmp_path, (name,)))
+    less, hanging = without_hanging(inputs)
+    (one,) = hanging.found
+    assert (one.sensor, one.reading) == ("attitude", name.removesuffix("_deg"))
+    assert hanging.left_out
+    assert np.array_equal(less.log.time_s, np.delete(inputs.log.time_s, ROWS))

@@ -13,7 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.diagnosis.frozen import Frozen
+from syncline_design.diagnosis.frozen import Frozen, summed
+from syncline_design.diagnosis.frozen_channels import euler_rates
 from syncline_design.diagnosis.gross import gross_faults
 from syncline_design.diagnosis.hanging import hanging, hanging_checks, what_hangs
 from syncline_design.diagnosis.mending import without_rows
@@ -23,6 +24,7 @@ from syncline_design.logs.log import Log
 from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_LEFT_OUT: Final = 0.6  # of the rows
+_HARDLY: Final = 0.1  # of what turn rates say
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,23 +69,47 @@ def without_hanging(inputs: Measured, exclude: Sequence[str] = ()) -> tuple[Meas
 def _hanging(inputs: Measured, exclude: Sequence[str]) -> tuple[Frozen, ...]:
     """Runs in which a device hangs whatever is grossly wrong with all of the log.
 
-    Columns in a unit in which they hardly move (radians for degrees) rest all of the time; in
-    their own they follow the course, and what hangs does not.
+    Columns in a unit in which they hardly move (radians for degrees) rest all of the time, and one
+    of them that hangs does not stand out; in their own they follow the course, and what hangs does
+    not.
     """
     found = hanging(inputs)
-    if not found:
+    if not found and not _hardly_turns(inputs):
         return ()
     faults, log = gross_faults(inputs.system, inputs.log, inputs.known, exclude, inputs.reread)
     if not faults:
         return found
     undone = hanging(replace(inputs, log=log))
+    seen = [_rows_of(one, log, inputs.log) for one in undone]
+    kept = tuple(one for one in found if any(_meets(one, other) for other in seen))
+    return (*kept, *(new for new in seen if not any(_meets(one, new) for one in kept)))
 
-    def meets(one: Frozen, other: Frozen) -> bool:
-        own, its = inputs.log.time_s, log.time_s
-        within = own[one.first] <= its[other.last] and its[other.first] <= own[one.last]
-        return (one.stage, one.sensor) == (other.stage, other.sensor) and bool(within)
 
-    return tuple(one for one in found if any(meets(one, other) for other in undone))
+def _hardly_turns(inputs: Measured) -> bool:
+    """Whether an angle goes over a small part of what its turn rates say."""
+    for logged in inputs.log.stages:
+        told = np.ptp(np.unwrap(logged.euler_rad, axis=0), axis=0)
+        asked = np.ptp(summed(inputs.log.time_s, euler_rates(logged)), axis=0)
+        if bool(np.any(told < _HARDLY * asked)):
+            return True
+    return False
+
+
+def _rows_of(one: Frozen, own: Log, log: Log) -> Frozen:
+    """The same run in the rows of a log that is stamped or sampled otherwise."""
+    at = np.arange(one.first, one.last + 1)
+    if len(own) == len(log):
+        return one
+    first, last = np.searchsorted(log.time_s, own.time_s[[one.first, one.last]])
+    last = min(max(int(last), int(first)), len(log) - 1)
+    rows = np.arange(min(int(first), last), last + 1)
+    off_m = np.interp(log.time_s[rows], own.time_s[at], one.off_m)
+    return replace(one, first=int(rows[0]), last=last, off_m=off_m)
+
+
+def _meets(one: Frozen, other: Frozen) -> bool:
+    within = one.first <= other.last and other.first <= one.last
+    return (one.stage, one.sensor) == (other.stage, other.sensor) and within
 
 
 def _without(inputs: Measured, found: Sequence[Frozen]) -> Log:
