@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from syncline_design.campaign.found_alone import found_alone
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.lasting_noise import within_lasting_noise
 from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
@@ -90,7 +91,8 @@ def tell(told: Told) -> Diagnosis:
     """The diagnosis of several logs."""
     promise = promise_of(told.case)
     weights = Weights(told.spec_m, promise)
-    found = [*_undone(told), *(_finding(told, one, weights) for one in told.named.terms)]
+    found = [*_undone(told), *(_finding(told, one, weights) for one in told.named.terms),
+             *found_alone(told.entries, told.pool, told.stages)]  # fmt: skip
     found.sort(key=lambda f: (not f.material, -f.gain_nat))
     left_m = max((run.left_m for run in told.runs), default=0.0)
     checks = tuple(_checks(told))

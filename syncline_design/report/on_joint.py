@@ -28,12 +28,14 @@ def scope_nodes(found: Finding) -> list[Node]:
     """Whether a finding is one value in all logs, how that was tested, and its value in each."""
     if found.scope is None:
         return []
+    if found.per_log and not any(one.parameters for one in found.per_log):
+        return [Text(f"In {', '.join(one.file for one in found.per_log)}.")]
     words = SCOPES[found.scope]
     if found.one_value is not None:
         words += f" {_tested(found)}"
     drawn = _by_log(found)
     nodes: list[Node] = [Text(words), *drawn]
-    if found.per_log and any(one.parameters for one in found.per_log):
+    if found.per_log:
         names = list(found.per_log[0].parameters)
         columns = [_column([one.parameters[n] for one in found.per_log]) for n in names]
         rows: list[tuple[Cell | str, ...]] = [
@@ -44,8 +46,6 @@ def scope_nodes(found: Finding) -> list[Node]:
         called = found.effect.replace("_", " ")
         shown = table(f"{called} ({found.sensor}) in each log", heads, rows)
         nodes += show(shown, reach="text" if drawn else "everywhere")  # the figure has its values
-    elif found.per_log:
-        nodes.append(Text(f"In {', '.join(one.file for one in found.per_log)}."))
     return nodes
 
 

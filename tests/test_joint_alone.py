@@ -1,0 +1,33 @@
+"""A log whose noise is another: no joint search looks for that, and it is said all the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from syncline_design.campaign.joint import JointRequest, diagnose_joint
+from syncline_design.comparison.meaning import with_design
+from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.render_console import console
+from syncline_design.spec.load import load
+from tests.world import hidden, make_log, scenario
+
+LOUD = hidden("noise_understated", "position", factor=6.0)
+
+
+def test_a_noisy_log_among_quiet_ones_is_no_agreement(tmp_path: Path) -> None:
+    """Three logs, positions of the second six times as noisy as the spec says."""
+    logs = []
+    for k in range(3):
+        made = make_log(scenario("car_stops", 300 + k, 60.0, 5.0), (LOUD,) if k == 1 else ())
+        logs.append(made.to_csv(tmp_path / f"log{k}.csv"))
+        (tmp_path / "spec.yaml").write_text(made.spec_yaml(), encoding="utf-8")
+    found = diagnose_joint(load(tmp_path / "spec.yaml"), JointRequest(tuple(logs)))
+    assert found.verdict == "explained"
+    (one,) = found.findings
+    assert (one.effect, one.sensor, one.scope) == ("noise_understated", "position", "log")
+    assert [log.file for log in one.per_log or ()] == ["log1.csv"]
+    assert one.sentence.startswith("In log1.csv: ")
+    assert found.effects_entries() == ()  # a spec holds what all logs have
+    said = " ".join(console(on_diagnosis(with_design(found, None)), colour=False).split())
+    assert "Nothing beyond the spec's own noise" not in said
+    assert "Another value in every log" not in said
