@@ -80,4 +80,5 @@ def _named(one: Finding) -> NamedAlone:
     effect = registry().get(one.effect)
     undone = effect is not None and effect.undoing is not None
     words = one.sentence + or_rivals([rivals] if (rivals := rivals_words(one)) else [])
-    return NamedAlone(one.effect, one.sensor, one.stage, words, undone)
+    kept = one.parameters if undone else None
+    return NamedAlone(one.effect, one.sensor, one.stage, words, undone, kept)

@@ -10,7 +10,7 @@ import numpy as np
 
 from syncline_design.campaign.column_sizes import column_sizes
 from syncline_design.campaign.packing import PackingError, lower, packed, unpacked, whole
-from syncline_design.diagnosis.result import Check
+from syncline_design.diagnosis.result import Check, Estimate
 from syncline_design.diagnosis.sufficient import Less, Sufficient, TermLabel
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
@@ -26,13 +26,18 @@ LARGEST: Final = 1e60  # information [1 / SI^2] of a parameter, beyond which non
 
 @dataclass(frozen=True, slots=True)
 class NamedAlone(Record):
-    """What the log alone named: effect, sensor, stage, convention in words where it is one."""
+    """What the log alone named: effect, sensor, stage, and all of it in words.
+
+    parameters: of what was undone in the log, for no joint fit finds them again; None of a run that
+    was kept before they were.
+    """
 
     effect: str
     sensor: str
     stage: str
     words: str
     undone: bool
+    parameters: Mapping[str, Estimate] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from syncline_design.campaign.found_alone import found_alone
+from syncline_design.campaign.found_alone import found_alone, undone_in_logs
 from syncline_design.campaign.kept import Run
 from syncline_design.campaign.lasting_noise import within_lasting_noise
 from syncline_design.campaign.naming import NamedTerm, NamedTogether, WorseFit
@@ -46,7 +46,6 @@ from syncline_design.diagnosis.same_system import description
 from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.sight import DetectionLimit, alone, informative
 from syncline_design.diagnosis.system import pinned_system
-from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.distributions import student_limit
@@ -91,8 +90,11 @@ def tell(told: Told) -> Diagnosis:
     """The diagnosis of several logs."""
     promise = promise_of(told.case)
     weights = Weights(told.spec_m, promise)
-    found = [*_undone(told), *(_finding(told, one, weights) for one in told.named.terms),
-             *found_alone(told.entries, told.pool, told.stages)]  # fmt: skip
+    found = [
+        *undone_in_logs(told.entries),
+        *(_finding(told, one, weights) for one in told.named.terms),
+        *found_alone(told.entries, told.pool, told.stages),
+    ]
     found.sort(key=lambda f: (not f.material, -f.gain_nat))
     left_m = max((run.left_m for run in told.runs), default=0.0)
     checks = tuple(_checks(told))
@@ -269,28 +271,6 @@ def _size_m(told: Told, k: int) -> float:
     squares = np.einsum("lp,lpq,lq->l", values, gram, values)
     rows = np.array([run.used for run in told.runs], dtype=float)
     return float(np.sqrt(max(float(rows @ squares) / float(np.sum(rows)), 0.0)))
-
-
-def _undone(told: Told) -> Iterator[Finding]:
-    """Gross faults that were undone in single logs, each with the logs that have it."""
-    groups: dict[tuple[str, str, str, str], list[Entry]] = {}
-    for entry in told.entries:
-        for one in entry.run.named:
-            if one.undone:
-                key = (one.effect, one.sensor, one.stage, one.words)
-                groups.setdefault(key, []).append(entry)
-    for (name, sensor, stage, words), entries in groups.items():
-        effect = registry()[name]
-        every = len(entries) == len(told.entries)
-        files = ", ".join(e.run.files[0] for e in entries)
-        said = f"undone in {'every log' if every else files} before anything was fitted"
-        yield Finding(
-            name, sensor, stage, {}, (), (), (), words, said, 0.0, None, effect.confused_with,
-            effect.separated_by, effect.source, scope="build" if every else "log",
-            per_log=None if every else tuple(
-                PerLog(e.number, e.run.files[0], e.start, {}) for e in entries
-            ),
-        )  # fmt: skip
 
 
 def _seen(told: Told) -> Iterator[DetectionLimit]:

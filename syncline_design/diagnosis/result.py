@@ -193,14 +193,11 @@ class Finding(Record):
     def fits_a_spec(self) -> bool:
         """Whether a spec can hold it."""
         effect = registry().get(self.effect)
+        values = {name: one.value for name, one in self.parameters.items()}
         return (
             effect is not None
             and self.scope in (None, "build")
-            and self.sensor in effect.sensors
-            and all(
-                p.misfit(self.parameters[p.name].value, self.sensor) is None
-                for p in effect.parameters
-            )
+            and not any(effect.misfits(self.sensor, values))
         )
 
     def as_entries(self) -> tuple[EffectChoice, ...]:
