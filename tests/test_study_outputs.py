@@ -158,7 +158,7 @@ def test_a_study_satisfies_its_schema_and_reads_back(result: StudyResult, tmp_pa
     for done in (result, run_study(write(tmp_path, combined))):
         text = text_of("json", done)
         jsonschema.validate(json.loads(text), schema)
-        assert read_as(StudyData, text) == study_data(done)
+        assert read_as(StudyData, text) == study_data(done, done.summary)
     assert {case.verdict for case in done.cases()} == {"meets", "refused"}
 
 

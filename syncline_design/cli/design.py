@@ -324,7 +324,7 @@ def study(
     settings = StudySettings(seed, workers, store, scheduler, dask, fresh=fresh)
     with watched(deadline, targets, quiet=quiet, steps=False):
         result = run_study(study_file, settings, None if quiet else ProgressLine())
-    text = f"{console(on_study(result))}\n{paragraph(stored_text(result))}"
+    text = "" if quiet else f"{console(on_study(result))}\n{paragraph(stored_text(result))}"
     emit(text, targets, lambda name: render_study(name, result), quiet=quiet,
          charts=lambda: {"": on_study(result)})  # fmt: skip
     return result.exit_code

@@ -218,6 +218,11 @@ def read_plain(path: Path, most: int | None = None) -> bytes:
     return content
 
 
+def read_own(path: Path, most: int) -> bytes:
+    """The same of a file that the program keeps for itself: not noted, as no user names it."""
+    return _read(path, most)[0]
+
+
 @contextlib.contextmanager
 def _plain(path: Path) -> Iterator[tuple[int, os.stat_result]]:
     """A plain file as an open descriptor, and what it is."""

@@ -55,7 +55,6 @@ from syncline_design.studies.summary import (
     StudyFront,
     StudySummary,
     heat_map,
-    summarise,
     varied,
 )
 from syncline_design.studies.table import reason
@@ -67,7 +66,7 @@ MOST_FRONTS = 8
 
 def on_study(result: StudyResult) -> Document:
     """A study as a document: what holds, least cost, who wins, where it ends, fronts, cases."""
-    summary = summarise(result)
+    summary = result.summary
     note = (given(result.study.note),) if result.study.note else ()
     winners = show(winners_table(summary), silent=True)
     cases = show(_case_table(summary), silent=True, reach="page")

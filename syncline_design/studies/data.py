@@ -17,10 +17,10 @@ from syncline_design.studies.summary import (
     Boundary,
     HeatMap,
     StudyFront,
+    StudySummary,
     Winner,
     boundaries,
     heat_map,
-    summarise,
     winners,
 )
 from syncline_design.studies.table import Value, rows, si_unit
@@ -78,9 +78,9 @@ class StudyData(Record):
     provenance: StudyProvenance
 
 
-def study_data(result: Finished) -> StudyData:
+def study_data(result: Finished, summary: StudySummary) -> StudyData:
     """The study as data."""
-    study, summary = result.study, summarise(result)
+    study = result.study
     return StudyData(
         SCHEMA, result.verdict, study.name, str(study.path), study.meets_when, result.counts,
         result.not_simulated, _factors(study), heat_map(summary), tuple(winners(summary)),

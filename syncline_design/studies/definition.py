@@ -7,6 +7,7 @@ the low end, so that what is computed is what the table says.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -29,6 +30,7 @@ from syncline_design.spec.keys import label
 from syncline_design.spec.yaml_text import plain_scalar
 
 MAX_CASES = 1_000_000
+MOST_KEPT = 2**16  # figures whose values are kept in memory
 MeetsWhen = Literal["all", "any", "decided"]
 FIGURES = 6
 Scale = Literal["linear", "log"]
@@ -192,8 +194,16 @@ class ValueSpan:
 
 def figure_of(value: Any) -> tuple[float, str] | None:
     """(figure in SI, its dimension) of `40 m` or a bare number; None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return None
+    return _in_si(_text_of(value), bare=not isinstance(value, str))
+
+
+@functools.lru_cache(maxsize=MOST_KEPT)
+def _in_si(text: str, *, bare: bool) -> tuple[float, str] | None:
+    """A figure's text in SI; a study asks for that of every value again in each of its outputs."""
     try:
-        number, unit = _split(value)
+        number, unit = _parted(text, bare=bare)
     except FactorError:
         return None
     if not unit:
@@ -207,12 +217,21 @@ def _split(value: Any) -> tuple[Fraction, str]:
     """Number and unit of a figure."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise FactorError("not a figure", "one such as 40 m", kind_of(value))
-    text = str(getattr(value, "text", None) or value).strip()
+    return _parted(_text_of(value), bare=not isinstance(value, str))
+
+
+def _text_of(value: float | str) -> str:
+    """As it was written, where that is known."""
+    return str(getattr(value, "text", None) or value).strip()
+
+
+def _parted(text: str, *, bare: bool) -> tuple[Fraction, str]:
+    """Number and unit; bare: the text of a number, which needs no unit."""
     digits, _, unit = text.partition(" ")
     unit = unit.strip()
     if unit and unit not in UNITS:
         raise FactorError("unknown unit", "a figure such as 40 m", repr(text))
-    if isinstance(value, str) and not unit:
+    if not bare and not unit:
         raise FactorError("not a figure", "one such as 40 m", repr(text))
     try:
         return parse_number(digits), unit

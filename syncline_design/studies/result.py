@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Json
 from syncline_design.studies.data import study_data
 from syncline_design.studies.finished import Finished
+from syncline_design.studies.summary import StudySummary, summarise
 
 FEW, EARLY_S = 20, 20.0  # cases and seconds before which their rate tells nothing
 
@@ -17,9 +19,14 @@ FEW, EARLY_S = 20, 20.0  # cases and seconds before which their rate tells nothi
 class StudyResult(Finished, Shown):
     """A finished study; iterate `cases()` for its results, in the order of the study."""
 
+    @cached_property
+    def summary(self) -> StudySummary:
+        """What it says as a whole, for every output."""
+        return summarise(self)
+
     def to_json(self) -> Json:
         """The study as data, with a row for every case: what `study --output json:-` prints."""
-        return study_data(self).to_json()
+        return study_data(self, self.summary).to_json()
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import re
 from pathlib import Path
 from typing import Final, TypeVar
 
-from syncline_design.machine.input_files import UnsuitableError, read_plain
+from syncline_design.machine.input_files import UnsuitableError, read_own
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import NotThisResultError, Record, read_as
 from syncline_design.machine.result_files import clear_stale, replace_whole
@@ -113,7 +113,7 @@ class _Reads(Record):
 def _text(path: Path) -> str:
     """What a file holds; nothing where it cannot be read."""
     try:
-        return read_plain(path, MOST_BYTES).decode("ascii")
+        return read_own(path, MOST_BYTES).decode("ascii")
     except (OSError, UnsuitableError, UnicodeDecodeError):
         return ""
 

@@ -291,12 +291,13 @@ def misses(summary: StudySummary, show: Shown = lambda _, label: label) -> list[
 
 def _extent(factor: Factor, present: set[str], show: Shown) -> str:
     """`40 m to 80 m`, `everywhere`, or the values one by one."""
-    ordered = [show(factor, text) for text in factor.axis if text in present]
+    ordered = [text for text in factor.axis if text in present]
     if len(ordered) == len(factor.axis):
         return "everywhere"
     if factor.is_of_figures and len(ordered) > 2:
-        return f"{ordered[0]} to {ordered[-1]}"
-    return ", ".join(ordered[:6]) + (", ..." if len(ordered) > 6 else "")
+        return f"{show(factor, ordered[0])} to {show(factor, ordered[-1])}"
+    shown = ", ".join(show(factor, text) for text in ordered[:6])
+    return shown + (", ..." if len(ordered) > 6 else "")
 
 
 def boundaries(summary: StudySummary) -> list[Boundary]:
