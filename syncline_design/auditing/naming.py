@@ -62,7 +62,8 @@ def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
     if len(slow) > 1 or slow[0].kind == "bend":
         rate = 1e6 * np.diff(moved) / np.diff(grid)
         parameters |= {"kind": "wandering", "ppm_low": float(rate.min()),
-                       "ppm_high": float(rate.max())}  # fmt: skip
+                       "ppm_high": float(rate.max()),
+                       "span_s": float(np.ptp(moved))}  # fmt: skip
         words += f" in the mean, between {signed(rate.min(), 3)} and {signed(rate.max(), 3)} ppm"
     span = in_words(float(np.ptp(moved)))
     words += f": {span} over the log, {_times(sure)} its uncertainty"

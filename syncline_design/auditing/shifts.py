@@ -26,6 +26,7 @@ from syncline_design.auditing.plain_step import without_plain_step
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds
 from syncline_design.auditing.settling import settled
+from syncline_design.auditing.wandering import wandering
 from syncline_design.auditing.whole_holes import breaks_none, passed
 from syncline_design.auditing.witness import Side
 from syncline_design.machine.quick_dataclass import dataclass
@@ -61,6 +62,7 @@ class Shifts:
     breathing_s: float = 0.0  # how far receipts move to and fro while stamps keep their rhythm
     seen: tuple[Shape, ...] = ()  # in the levels, whosever they are
     beat_s: float = 0.0  # what is slow and smaller may be a beat with a host's ticks
+    own: int = 0  # shapes of which the faults of slow courses are made
     hidden_s: float = 0.0  # steps up to a host's tick that its receipts do not tell
 
 
@@ -69,6 +71,7 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     nothing = Shifts(series, (), (), None)
     if series.receive is None or series.good.sum() < 2:
         return nothing
+    given = series
     series, locks = without_locks(series, cadence(series), least_s)
     mended = without_jumps(series, cadence(series), least_s)
     series = mended.series
@@ -85,7 +88,14 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
         whole, faults = without_plain_step(moved.series, cadence(series), least_s)
         moved = replace(moved, series=whole)
     hidden_s = max(moved.hidden_s, mended.hidden_s)
-    return replace(moved, faults=faults, shifts=(*own, *moved.shifts), hidden_s=hidden_s)
+    found = replace(moved, faults=faults, shifts=(*own, *moved.shifts), hidden_s=hidden_s)
+    told = len(mended.faults) + len(locks) + moved.own, found.series
+    if not faults:  # what was seen, whosever it is, may tell more than a walk does
+        told = len(moved.seen), put_back(given, moved.seen)
+    one = wandering(given, told[1], told[0], least_s)
+    if one is None:
+        return found
+    return replace(found, series=one.series, faults=(one.fault,), shifts=(), seen=())
 
 
 def _joined(
@@ -166,17 +176,25 @@ def _slow_shifts(
     own = witness.simplest(count, own, blocks)
     left = tuple(s for s in found if s not in own and s.kind not in ("step", "episode"))
     own = settled(own, time_s, late, blocks)
-    whole = series.stamp.copy()
-    whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
     faults = tuple(all_named(own, time_s))
     shifts = tuple(
         Shift(s.begin_s, None if s.kind == "step" else s.end_s, s.size_s, side, blocks.length_s)
         for s, side, seen in zip(found, sides, sharp, strict=True) if seen or side == "stamp"
     )  # fmt: skip
     breathing = float(np.ptp(course(left, blocks.time_s))) if left else 0.0
-    put_back = replace(series, stamp=whole)
     told_s = tick if hidden else 0.0
-    return Shifts(put_back, faults, shifts, blocks, breathing, seen, max(beat_s, told_s), told_s)
+    return Shifts(
+        put_back(series, own), faults, shifts, blocks, breathing, seen, max(beat_s, told_s),
+        len(own), told_s,
+    )  # fmt: skip
+
+
+def put_back(series: Series, shapes: tuple[Shape, ...]) -> Series:
+    """The series with the course of these shapes taken out of its stamps."""
+    places = series.places()
+    whole = series.stamp.copy()
+    whole[places] += np.round(course(shapes, series.seconds[places]) * NS).astype(np.int64)
+    return replace(series, stamp=whole)
 
 
 def _with_what_it_stamps(shape: Shape, time_s: Array, late: Array, tick_s: float) -> bool:

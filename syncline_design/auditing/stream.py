@@ -345,12 +345,26 @@ def _last(
         found += [arrived] if arrived is not None else []
     if known is not None:
         found += _constant(series, known, grain.size_s if grain else _coarse(series), names)
+    found[:] = _with_ahead(found)
     explained = names & {"whole_second_slip", "counter_wrap", "step", "relock"}
     fall = None if explained else order.remaining_falls(shifted, series)
     found += [fall] if fall is not None and "backward_jump" not in names else []
     scan = scans.scan(series, stream.points, pace.period_s)
     if scan is not None and not (scan.counts and {f.fault for f in found} & _OFF):
         found.append(scan)
+
+
+def _with_ahead(found: Sequence[StampFault]) -> list[StampFault]:
+    """Stamps after their receipts follow from a clock that wanders at least as far."""
+    ahead = next((f for f in found if f.fault == "ahead_of_receipt"), None)
+    wanders = next((f for f in found if f.parameters.get("kind") == "wandering"), None)
+    if ahead is None or wanders is None:
+        return list(found)
+    if float(ahead.parameters["seconds"]) > float(wanders.parameters["span_s"]):
+        return list(found)
+    follows = Consequence("ahead_of_receipt", ahead.parameters, ahead.evidence)
+    caused = replace(wanders, consequences=(*wanders.consequences, follows))
+    return [caused if f is wanders else f for f in found if f is not ahead]
 
 
 def _blurs(arrived: StampFault, pace: Cadence) -> bool:

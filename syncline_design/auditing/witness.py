@@ -200,6 +200,14 @@ def mirrored(found: Witness | None, blocks: Blocks) -> Blocks | None:
     return Blocks(found.time_s, -found.level_s, use, noise, blocks.spread_s, blocks.edges)
 
 
+def is_stamps(found: Witness, blocks: Blocks, least_s: float) -> bool:
+    """Whether the stamps leave the count by a course that receipts against them take as well."""
+    told = _bent(found.level_s, found.time_s)
+    late = _bent(blocks.low_s[blocks.usable], found.time_s)
+    floor = max(_LEAST_SHARE * blocks.spread_s, _LEAST_RUN_S, least_s)
+    return float(np.ptp(told)) >= floor and _side(told, late) == "stamp"
+
+
 def simplest(found: Witness | None, own: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape, ...]:
     """Shapes, or in place of many one clock that wanders, where that explains as much."""
     straight = tuple(s for s in own if s.kind == "drift")
