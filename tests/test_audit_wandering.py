@@ -75,6 +75,7 @@ def test_a_clock_that_wanders_is_one_drift(course: Course, seed: int, tmp_path: 
     (one,) = found.faults
     assert (one.fault, one.parameters["kind"]) == ("drift", "wandering")
     assert one.parameters["span_s"] == pytest.approx(float(np.ptp(moved)), rel=0.15)
+    assert not [one for one in found.cannot_show if "receipts move to and fro" in one]
     true = float(np.ptp(receive - t))
     assert 0.9 * true < (found.residual_s.bound or 0.0) < 1.1 * true + 1e-3
 

@@ -95,7 +95,9 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     one = wandering(given, told[1], told[0], least_s)
     if one is None:
         return found
-    return replace(found, series=one.series, faults=(one.fault,), shifts=(), seen=())
+    return replace(
+        found, series=one.series, faults=(one.fault,), shifts=(), seen=(), breathing_s=0.0
+    )
 
 
 def _joined(

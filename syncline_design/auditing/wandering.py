@@ -25,6 +25,7 @@ from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, in_words, seconds
 from syncline_design.auditing.whole_holes import counted
 from syncline_design.auditing.witness import is_stamps, witness_of
+from syncline_design.logs.readers.stream import Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import signed, to_digits
 
@@ -120,8 +121,19 @@ def _freed(series: Series, pace: Cadence, blocks: Blocks, walk: _Walk) -> Wander
     course -= float(np.median(course[: blocks.edges[1]]))
     stamp = series.stamp.copy()
     stamp[places] += np.round(course * NS).astype(np.int64)
+    stamp[places] -= _ahead(series.receive, stamp, places, float(np.ptp(course)))
     put_back = Series(stamp, series.receive, series.good, series.start)
     return Wandering(put_back, _fault(time_s, -course))
+
+
+def _ahead(
+    receive: Nanoseconds | None, stamp: Nanoseconds, places: NDArray[np.intp], span_s: float
+) -> int:  # fmt: skip
+    """By how much [ns] the stamps are to be earlier so that none lies after its receipt, where the
+    clock wandered as far: then it was ahead when the log began."""
+    assert receive is not None
+    least = int(np.min((receive - stamp)[places]))
+    return -least if -span_s * NS < least < 0 else 0
 
 
 def _against_count(series: Series, pace: Cadence) -> Array:
