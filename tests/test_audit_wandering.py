@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
 
 from syncline_design.auditing.result import StreamAudit
 from syncline_design.auditing.run import audit
+from syncline_design.auditing.wandering import profiled, smoothed
 
 Array = NDArray[np.float64]
 Course = Callable[[Array, float, np.random.Generator], Array]
@@ -106,3 +108,34 @@ def test_what_wanders_beside_stamps_is_no_fault_of_theirs(
     stamp = t + moved if whose == "sensor" else t
     found = recorded(tmp_path, stamp, np.maximum.accumulate(receive + moved))
     assert not [one for one in found.faults if one.parameters.get("kind") == "wandering"]
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.03, 4.0])
+def test_the_likelihood_of_a_walk_is_that_of_its_dense_covariance(ratio: float) -> None:
+    """Of differences, at the likeliest variance; the constant n (log 2 pi + 1) is left out."""
+    rng = np.random.default_rng(5)
+    dt = rng.uniform(0.5, 1.5, 40)
+    apart = rng.standard_normal(40)
+    difference = np.diff(np.eye(41), axis=0)
+    times = np.concatenate([[0.0], np.cumsum(dt)])
+    level = ratio * np.minimum.outer(times, times) + np.eye(41)  # a walk from 0, and white
+    shape = difference @ level @ difference.T
+    fit, r = profiled(apart, dt, ratio)
+    dense = multivariate_normal(np.zeros(40), r * shape).logpdf(apart)
+    assert fit + 40.0 * (np.log(2.0 * np.pi) + 1.0) == pytest.approx(-2.0 * dense, rel=1e-9)
+    for other in (0.9 * r, 1.1 * r):
+        assert multivariate_normal(np.zeros(40), other * shape).logpdf(apart) < dense
+
+
+def test_the_walk_that_is_taken_out_is_the_mean_of_the_dense_posterior() -> None:
+    """Away from the ends, where the log has no walk to go on from: 300 messages, 0.1 s apart."""
+    rng = np.random.default_rng(6)
+    time_s = 0.1 * np.arange(300)
+    q, jitter = 4e-6, 1e-3
+    truth = np.cumsum(np.sqrt(0.1 * q) * rng.standard_normal(300))
+    told = truth + jitter * rng.standard_normal(300)
+    r = 0.5 * (float(np.var(np.diff(told))) - 0.1 * q)  # as it is estimated
+    walked = 0.1 * q * np.minimum.outer(np.arange(300) + 1e6, np.arange(300) + 1e6)
+    dense = walked @ np.linalg.solve(walked + r * np.eye(300), told)
+    found = smoothed(told, time_s, q)
+    assert found[60:-60] == pytest.approx(dense[60:-60], abs=0.02 * float(np.std(truth)))

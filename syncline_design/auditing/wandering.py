@@ -89,14 +89,14 @@ def _walk(time_s: Array, level_s: Array) -> _Walk:
     line = np.polynomial.polynomial.polyfit(time_s, level_s, 1)
     apart = np.diff(level_s - np.polynomial.polynomial.polyval(time_s, line))
     dt = np.diff(time_s) / float(np.median(np.diff(time_s)))
-    told = [_profiled(apart, dt, float(ratio)) for ratio in _RATIOS]
+    told = [profiled(apart, dt, float(ratio)) for ratio in _RATIOS]
     best = int(np.argmin([fit for fit, _ in told]))
     r = told[best][1]
     usual = float(np.median(np.diff(time_s)))
     return _Walk(told[best][0], told[0][0], float(_RATIOS[best]) * r / usual)
 
 
-def _profiled(apart: Array, dt: Array, ratio: float) -> tuple[float, float]:
+def profiled(apart: Array, dt: Array, ratio: float) -> tuple[float, float]:
     """(-2 log L, r) of differences, at the likeliest r; ratio: of q dt to r."""
     from scipy.linalg import cholesky_banded, solveh_banded
 
@@ -113,7 +113,7 @@ def _freed(series: Series, pace: Cadence, blocks: Blocks, walk: _Walk) -> Wander
     """Stamps put back by the walk, and by the line along which receipts run away from them."""
     places = series.places()
     time_s = series.seconds[places]
-    course = -_smoothed(_against_count(series, pace), time_s, walk.q)
+    course = -smoothed(_against_count(series, pace), time_s, walk.q)
     use = blocks.usable
     level = blocks.low_s[use] - np.interp(blocks.time_s[use], time_s, course)
     line = np.polynomial.polynomial.polyfit(blocks.time_s[use], level, 1)
@@ -144,7 +144,7 @@ def _against_count(series: Series, pace: Cadence) -> Array:
     return np.asarray(when - np.polynomial.polynomial.polyval(count, line))
 
 
-def _smoothed(apart: Array, time_s: Array, q: float) -> Array:
+def smoothed(apart: Array, time_s: Array, q: float) -> Array:
     """The walk beside a jitter of single stamps: the local level's smoother, run both ways.
 
     Its weights fall by a factor of theta a message, theta + 1 / theta = 2 + q dt / r.
