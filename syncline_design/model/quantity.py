@@ -7,6 +7,7 @@ The table is closed: what it does not list is refused, with the nearest entry as
 
 from __future__ import annotations
 
+import functools
 import re
 from fractions import Fraction
 from typing import Any, NoReturn
@@ -22,6 +23,7 @@ from syncline_design.model.unit_table import Dimension as Dimension
 # products would leave the range of a float.
 SMALLEST, LARGEST = Fraction(1, 10**30), Fraction(10**30)
 MAX_NUMBER_LENGTH = 60
+MOST_KEPT = 4096  # quantities that were read
 MAX_TEXT_LENGTH = 300  # a quantity is echoed in reports; two numbers, a unit each, room for spaces
 
 
@@ -144,7 +146,9 @@ def parse_quantity(value: Any, dimension: Dimension, *, tolerance: bool = True) 
     return read
 
 
+@functools.lru_cache(maxsize=MOST_KEPT)
 def _read(text: str, dimension: Dimension, tolerance: bool) -> Quantity:
+    """Kept, for a study reads the same figures in every case; a quantity is read-only."""
     if ends := _split(text, _TO):
         return _with_range(text, *ends, dimension, tolerance)
     if parts := _split(text, _PLUS_MINUS):
