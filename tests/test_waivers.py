@@ -375,7 +375,7 @@ def test_a_study_tells_every_waiver_of_what_its_bases_miss(tmp_path: Path) -> No
     assert "waived until 2027-03-31: paper trial; waiver expired on 2026-11-29: late" in shown
     told = "".join(one.message for one in study_notices(result))
     assert "waiver expired on 2026-11-29: late" in told
-    assert study_data(result).provenance.judged_on == DAY.isoformat()
+    assert study_data(result, result.summary).provenance.judged_on == DAY.isoformat()
     assert DAY.isoformat() in html(on_study(result))
 
 
