@@ -194,9 +194,7 @@ class ValueSpan:
 
 def figure_of(value: Any) -> tuple[float, str] | None:
     """(figure in SI, its dimension) of `40 m` or a bare number; None for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        return None
-    return _in_si(_text_of(value), bare=not isinstance(value, str))
+    return _in_si(_text_of(value), bare=not isinstance(value, str)) if _may_be(value) else None
 
 
 @functools.lru_cache(maxsize=MOST_KEPT)
@@ -215,9 +213,14 @@ def _in_si(text: str, *, bare: bool) -> tuple[float, str] | None:
 
 def _split(value: Any) -> tuple[Fraction, str]:
     """Number and unit of a figure."""
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
+    if not _may_be(value):
         raise FactorError("not a figure", "one such as 40 m", kind_of(value))
     return _parted(_text_of(value), bare=not isinstance(value, str))
+
+
+def _may_be(value: Any) -> bool:
+    """Whether a value may be a figure: a number, or the text of one with its unit."""
+    return isinstance(value, int | float | str) and not isinstance(value, bool)
 
 
 def _text_of(value: float | str) -> str:
