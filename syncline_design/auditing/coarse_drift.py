@@ -8,7 +8,6 @@ follow each to transport's own scatter.
 from __future__ import annotations
 
 from collections.abc import Set
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,7 +19,7 @@ from syncline_design.auditing.coarse_rhythm import counted_behind, periods_withi
 from syncline_design.auditing.levels import believed, polished
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import FaultName, StampFault
-from syncline_design.auditing.series import NS, Array, Series, seconds
+from syncline_design.auditing.series import Array, Series, seconds
 from syncline_design.auditing.witness import straight
 from syncline_design.logs.readers.stream import Nanoseconds
 
@@ -42,10 +41,8 @@ def drift_behind(
     alone = straight(blocks.time_s[use], blocks.low_s[use], blocks.noise_s)
     if not alone or not believed(found[0], blocks, max(least_s, unsure_s)):
         return series, ()
-    whole = series.stamp.copy()
     moved = course(found, time_s)[_first_alike(series.stamp[series.places()])]
-    whole[series.places()] += np.round(moved * NS).astype(np.int64)
-    return replace(series, stamp=whole), tuple(all_named(found, time_s))
+    return series.stamped_later(moved), tuple(all_named(found, time_s))
 
 
 def _late(series: Series, names: Set[FaultName], tick_s: float) -> tuple[Array | None, float]:

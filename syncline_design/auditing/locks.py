@@ -15,7 +15,7 @@ import numpy as np
 
 from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.clock_shapes import Shape, course
-from syncline_design.auditing.series import NS, Array, Series, seconds
+from syncline_design.auditing.series import Array, Series, seconds
 from syncline_design.machine.deadline import in_force
 
 _JITTER: Final = 10.0  # times: smaller breaks are the rhythm's own
@@ -45,13 +45,11 @@ def without_locks(
     times = np.concatenate([[0.0], np.cumsum(np.maximum(pace.steps, 1.0) * pace.period_s)])
     late = seconds((series.receive - series.stamp)[pace.places])
     shapes = _found(pace, times, late, least_s)
-    stamp = series.stamp.copy()
-    stamp[pace.places] += np.round(course(shapes, times) * NS).astype(np.int64)
     begins = series.seconds[pace.places][np.searchsorted(times, [s.begin_s for s in shapes])]
     received = tuple(
         replace(s, begin_s=float(t), end_s=float(t)) for s, t in zip(shapes, begins, strict=True)
     )
-    return replace(series, stamp=stamp), received
+    return series.stamped_later(course(shapes, times)), received
 
 
 def _found(pace: Cadence, times: Array, late: Array, least_s: float) -> tuple[Shape, ...]:

@@ -15,6 +15,7 @@ from syncline_design.model.figure_text import signed, to_digits
 
 _SMALL: Final = 0.1  # of the largest stretch: rates that are hardly another
 _LEAST_S: Final = 2e-5
+PLACES: Final = 101  # of a course, of which rates are told
 _SURELY: Final = 100  # standard deviations
 
 
@@ -50,7 +51,7 @@ def _pieces(slow: tuple[Shape, ...], time_s: Array) -> Iterator[StampFault]:
 
 def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
     """Rate of the stamps against receipts: its mean, and from where to where it changes."""
-    grid = np.linspace(float(time_s[0]), float(time_s[-1]), 101)
+    grid = np.linspace(float(time_s[0]), float(time_s[-1]), PLACES)
     moved = -course(slow, grid)
     length = float(grid[-1] - grid[0])
     ppm = 1e6 * float(moved[-1] - moved[0]) / length
@@ -60,14 +61,21 @@ def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
         f"stamps run {to_digits(abs(ppm), 4)} ppm {'fast' if ppm > 0 else 'slow'} against receipts"
     )
     if len(slow) > 1 or slow[0].kind == "bend":
-        rate = 1e6 * np.diff(moved) / np.diff(grid)
-        parameters |= {"kind": "wandering", "ppm_low": float(rate.min()),
-                       "ppm_high": float(rate.max()),
-                       "span_s": float(np.ptp(moved))}  # fmt: skip
-        words += f" in the mean, between {signed(rate.min(), 3)} and {signed(rate.max(), 3)} ppm"
+        parameters = wandering_rates(grid, moved)
+        low, high = float(parameters["ppm_low"]), float(parameters["ppm_high"])
+        words += f" in the mean, between {signed(low, 3)} and {signed(high, 3)} ppm"
     span = in_words(float(np.ptp(moved)))
     words += f": {span} over the log, {_times(sure)} its uncertainty"
     return StampFault("drift", parameters, None, None, words)
+
+
+def wandering_rates(time_s: Array, moved: Array) -> dict[str, float | str]:
+    """Parameters of a drift that changes its rate: mean, least and largest rate, reach in all;
+    moved: stamp minus receipt [s]."""
+    rate = 1e6 * np.diff(moved) / np.diff(time_s)
+    ppm = 1e6 * float(moved[-1] - moved[0]) / float(time_s[-1] - time_s[0])
+    return {"ppm": ppm, "kind": "wandering", "ppm_low": float(rate.min()),
+            "ppm_high": float(rate.max()), "span_s": float(np.ptp(moved))}  # fmt: skip
 
 
 def _named(shape: Shape, time_s: Array) -> StampFault:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,6 +44,12 @@ class Series:
 
     def places(self) -> NDArray[np.intp]:
         return np.flatnonzero(self.good)
+
+    def stamped_later(self, by_s: Array) -> Series:
+        """The series with its usable stamps later by so much each [s]."""
+        stamp = self.stamp.copy()
+        stamp[self.places()] += np.round(by_s * NS).astype(np.int64)
+        return replace(self, stamp=stamp)
 
 
 def series_of(stamp: Nanoseconds, receive: Nanoseconds | None, start: int | None = None) -> Series:

@@ -24,7 +24,7 @@ from syncline_design.auditing.locks import without_locks
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.plain_step import without_plain_step
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Array, Series, seconds
+from syncline_design.auditing.series import Array, Series, seconds
 from syncline_design.auditing.settling import settled
 from syncline_design.auditing.wandering import wandering
 from syncline_design.auditing.whole_holes import breaks_none, passed
@@ -89,10 +89,10 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
         moved = replace(moved, series=whole)
     hidden_s = max(moved.hidden_s, mended.hidden_s)
     found = replace(moved, faults=faults, shifts=(*own, *moved.shifts), hidden_s=hidden_s)
-    told = len(mended.faults) + len(locks) + moved.own, found.series
+    freed, shapes = found.series, len(mended.faults) + len(locks) + moved.own
     if not faults:  # what was seen, whosever it is, may tell more than a walk does
-        told = len(moved.seen), put_back(given, moved.seen)
-    one = wandering(given, told[1], told[0], least_s)
+        freed, shapes = put_back(given, moved.seen), len(moved.seen)
+    one = wandering(given, freed, shapes, least_s)
     if one is None:
         return found
     return replace(
@@ -193,10 +193,7 @@ def _slow_shifts(
 
 def put_back(series: Series, shapes: tuple[Shape, ...]) -> Series:
     """The series with the course of these shapes taken out of its stamps."""
-    places = series.places()
-    whole = series.stamp.copy()
-    whole[places] += np.round(course(shapes, series.seconds[places]) * NS).astype(np.int64)
-    return replace(series, stamp=whole)
+    return series.stamped_later(course(shapes, series.seconds[series.places()]))
 
 
 def _with_what_it_stamps(shape: Shape, time_s: Array, late: Array, tick_s: float) -> bool:

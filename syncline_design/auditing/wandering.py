@@ -21,11 +21,10 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
+from syncline_design.auditing.naming import PLACES, wandering_rates
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Array, Series, in_words, seconds
-from syncline_design.auditing.whole_holes import counted
-from syncline_design.auditing.witness import is_stamps, witness_of
-from syncline_design.logs.readers.stream import Nanoseconds
+from syncline_design.auditing.series import Array, Series, in_words, seconds
+from syncline_design.auditing.witness import against_count, bent, is_stamps, witness_of
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import signed, to_digits
 
@@ -33,7 +32,6 @@ _RATIOS: Final = np.concatenate([[0.0], np.geomspace(1e-4, 1e4, 33)])  # of q dt
 _FIGURES: Final = 3.0  # of a shape: size, place, and an end or a time constant
 _TO_AND_FRO: Final = 10.0  # of -2 log L: so much better is a walk than white noise
 _BEYOND: Final = 2.0  # grains: a beat with a grid stays within one
-_GRID: Final = 101  # places of a course of which rates are told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +75,7 @@ def _late(series: Series, places: NDArray[np.intp]) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Walk:
-    """-2 log L of a walk and of white noise alone; q: variance of the walk a second [s]."""
+    """-2 log L of a walk and of white noise alone; q: variance of the walk a second [s^2/s]."""
 
     fit: float
     white: float
@@ -86,8 +84,7 @@ class _Walk:
 
 def _walk(time_s: Array, level_s: Array) -> _Walk:
     """The likeliest walk beside white noise, a line taken off first."""
-    line = np.polynomial.polynomial.polyfit(time_s, level_s, 1)
-    apart = np.diff(level_s - np.polynomial.polynomial.polyval(time_s, line))
+    apart = np.diff(bent(level_s, time_s))
     dt = np.diff(time_s) / float(np.median(np.diff(time_s)))
     told = [profiled(apart, dt, float(ratio)) for ratio in _RATIOS]
     best = int(np.argmin([fit for fit, _ in told]))
@@ -113,35 +110,22 @@ def _freed(series: Series, pace: Cadence, blocks: Blocks, walk: _Walk) -> Wander
     """Stamps put back by the walk, and by the line along which receipts run away from them."""
     places = series.places()
     time_s = series.seconds[places]
-    course = -smoothed(_against_count(series, pace), time_s, walk.q)
+    course = -smoothed(bent(against_count(series, pace), time_s), time_s, walk.q)
     use = blocks.usable
     level = blocks.low_s[use] - np.interp(blocks.time_s[use], time_s, course)
     line = np.polynomial.polynomial.polyfit(blocks.time_s[use], level, 1)
     course += line[1] * time_s
     course -= float(np.median(course[: blocks.edges[1]]))
-    stamp = series.stamp.copy()
-    stamp[places] += np.round(course * NS).astype(np.int64)
-    stamp[places] -= _ahead(series.receive, stamp, places, float(np.ptp(course)))
-    put_back = Series(stamp, series.receive, series.good, series.start)
-    return Wandering(put_back, _fault(time_s, -course))
+    late = seconds((series.receive - series.stamp)[places]) - course  # type: ignore[operator]
+    course -= _ahead(late, float(np.ptp(course)))
+    return Wandering(series.stamped_later(course), _fault(time_s, -course))
 
 
-def _ahead(
-    receive: Nanoseconds | None, stamp: Nanoseconds, places: NDArray[np.intp], span_s: float
-) -> int:  # fmt: skip
-    """By how much [ns] the stamps are to be earlier so that none lies after its receipt, where the
+def _ahead(late: Array, span_s: float) -> float:
+    """By how much [s] the stamps are to be earlier so that none lies after its receipt, where the
     clock wandered as far: then it was ahead when the log began."""
-    assert receive is not None
-    least = int(np.min((receive - stamp)[places]))
-    return -least if -span_s * NS < least < 0 else 0
-
-
-def _against_count(series: Series, pace: Cadence) -> Array:
-    """Stamps less the even count of messages [s], without their line."""
-    count = np.concatenate([[0.0], np.cumsum(counted(series, pace))])
-    when = seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
-    line = np.polynomial.polynomial.polyfit(count, when, 1)
-    return np.asarray(when - np.polynomial.polynomial.polyval(count, line))
+    least = float(np.min(late))
+    return -least if -span_s < least < 0.0 else 0.0
 
 
 def smoothed(apart: Array, time_s: Array, q: float) -> Array:
@@ -159,17 +143,13 @@ def smoothed(apart: Array, time_s: Array, q: float) -> Array:
 
 
 def _fault(time_s: Array, moved: Array) -> StampFault:
-    grid = np.linspace(float(time_s[0]), float(time_s[-1]), _GRID)
-    at = np.interp(grid, time_s, moved)
-    rate = 1e6 * np.diff(at) / np.diff(grid)
-    ppm = 1e6 * float(at[-1] - at[0]) / float(grid[-1] - grid[0])
+    grid = np.linspace(float(time_s[0]), float(time_s[-1]), PLACES)
+    parameters = wandering_rates(grid, np.interp(grid, time_s, moved))
+    parameters["span_s"] = span_s = float(np.ptp(moved))
+    ppm, low, high = (float(parameters[key]) for key in ("ppm", "ppm_low", "ppm_high"))
     return StampFault(
-        "drift",
-        {"ppm": ppm, "kind": "wandering", "ppm_low": float(rate.min()),
-         "ppm_high": float(rate.max()), "span_s": float(np.ptp(moved))},
-        None, None,
-        f"stamps wander to and fro against receipts, within {in_words(float(np.ptp(moved)))}, and "
-        f"so they do against the sensor's own rhythm; between {signed(float(rate.min()), 3)} and "
-        f"{signed(float(rate.max()), 3)} ppm, {to_digits(abs(ppm), 3)} ppm "
-        f"{'fast' if ppm > 0 else 'slow'} in the mean",
+        "drift", parameters, None, None,
+        f"stamps wander to and fro against receipts, within {in_words(span_s)}, and so they do "
+        f"against the sensor's own rhythm; between {signed(low, 3)} and {signed(high, 3)} ppm, "
+        f"{to_digits(abs(ppm), 3)} ppm {'fast' if ppm > 0 else 'slow'} in the mean",
     )  # fmt: skip

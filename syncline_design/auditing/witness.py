@@ -58,15 +58,20 @@ def witness_of(series: Series, pace: Cadence, blocks: Blocks) -> Witness | None:
     off = np.abs(pace.interval - pace.steps * pace.period_s)
     if float(np.percentile(off, 90.0)) > _COUNTED * pace.period_s:
         return None
-    count = np.concatenate([[0.0], np.cumsum(counted(series, pace))])
-    when = seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
-    apart = when - pace.period_s * count
+    apart = against_count(series, pace)
     level = np.asarray([median(apart[a:b]) for a, b in _pairs(blocks.edges)])
     use = blocks.usable
     if use.sum() < 8:
         return None
     around = np.diff(level)
     return Witness(blocks.time_s[use], level[use], scatter(around) / float(np.sqrt(2.0)))
+
+
+def against_count(series: Series, pace: Cadence) -> Array:
+    """Stamps less the even count of messages [s]."""
+    count = np.concatenate([[0.0], np.cumsum(counted(series, pace))])
+    when = seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
+    return np.asarray(when - pace.period_s * count)
 
 
 def _pairs(edges: np.ndarray) -> list[tuple[int, int]]:
@@ -82,8 +87,8 @@ def sides(
     if witness is None or not slow:
         return found
     steps = tuple(s for k, s in enumerate(shapes) if k not in slow and known[k] == "stamp")
-    told = _bent(witness.level_s + course(steps, witness.time_s), witness.time_s)
-    whole = _bent(course(tuple(shapes[k] for k in slow), witness.time_s), witness.time_s)
+    told = bent(witness.level_s + course(steps, witness.time_s), witness.time_s)
+    whole = bent(course(tuple(shapes[k] for k in slow), witness.time_s), witness.time_s)
     joint = _side(told, whole)
     for k in slow:
         alone = _side_of(witness.time_s, told, shapes, slow, k) if joint == "unknown" else joint
@@ -95,7 +100,7 @@ def _open(shape: Shape, side: Side) -> bool:
     return shape.kind in ("step", "episode") and side == "unknown"
 
 
-def _bent(values: Array, time_s: Array) -> Array:
+def bent(values: Array, time_s: Array) -> Array:
     """Without its best line."""
     x = time_s - time_s.mean()
     y = values - values.mean()
@@ -121,7 +126,7 @@ def _side_of(
     time_s: Array, told: Array, shapes: Sequence[Shape], slow: Sequence[int], which: int
 ) -> Side:  # fmt: skip
     """The same of one shape among several, by least squares."""
-    courses = np.stack([_bent(shapes[k].size_s * shapes[k].at(time_s), time_s) for k in slow], 1)
+    courses = np.stack([bent(shapes[k].size_s * shapes[k].at(time_s), time_s) for k in slow], 1)
     sizes, *_ = np.linalg.lstsq(courses, -told, rcond=None)
     rest = told + courses @ sizes
     own = courses[:, slow.index(which)]
@@ -166,8 +171,8 @@ def wander(found: Witness | None, own: tuple[Shape, ...], blocks: Blocks) -> tup
     if found is None or found.time_s.size < 3 * _BENDS:
         return ()
     time_s = found.time_s
-    told = _bent(found.level_s + course(own, time_s), time_s)
-    late = _bent(blocks.low_s[blocks.usable] - course(own, time_s), time_s)
+    told = bent(found.level_s + course(own, time_s), time_s)
+    late = bent(blocks.low_s[blocks.usable] - course(own, time_s), time_s)
     floor = max(SURE * found.noise_s, SURE * blocks.noise_s, _LEAST_SHARE * blocks.spread_s)
     if float(np.ptp(told)) < max(floor, _LEAST_RUN_S) or not _alike(late, -told):
         return ()
@@ -190,8 +195,8 @@ def mirrored(found: Witness | None, blocks: Blocks) -> Blocks | None:
     """
     if found is None or found.time_s.size < 8:
         return None
-    told = _bent(found.level_s, found.time_s)
-    late = _bent(blocks.low_s[blocks.usable], found.time_s)
+    told = bent(found.level_s, found.time_s)
+    late = bent(blocks.low_s[blocks.usable], found.time_s)
     floor = max(SURE * blocks.noise_s, _LEAST_SHARE * blocks.spread_s, _LEAST_RUN_S)
     if float(np.ptp(told)) < floor or not _alike(late, -told):
         return None
@@ -202,8 +207,8 @@ def mirrored(found: Witness | None, blocks: Blocks) -> Blocks | None:
 
 def is_stamps(found: Witness, blocks: Blocks, least_s: float) -> bool:
     """Whether the stamps leave the count by a course that receipts against them take as well."""
-    told = _bent(found.level_s, found.time_s)
-    late = _bent(blocks.low_s[blocks.usable], found.time_s)
+    told = bent(found.level_s, found.time_s)
+    late = bent(blocks.low_s[blocks.usable], found.time_s)
     floor = max(_LEAST_SHARE * blocks.spread_s, _LEAST_RUN_S, least_s)
     return float(np.ptp(told)) >= floor and _side(told, late) == "stamp"
 
@@ -228,7 +233,7 @@ def straight(time_s: Array, level_s: Array, noise_s: float) -> bool:
     parts = np.array_split(np.arange(time_s.size), min(_PARTS, time_s.size))
     when = np.asarray([float(time_s[p].mean()) for p in parts])
     level = np.asarray([float(np.median(level_s[p])) for p in parts])
-    away = _bent(level, when)
+    away = bent(level, when)
     chance = 4.0 * noise_s / float(np.sqrt(time_s.size / when.size))
     span = float(np.ptp(level - away))
     steep = span > _CRYSTAL * float(np.ptp(when))
